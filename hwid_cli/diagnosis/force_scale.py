@@ -11,9 +11,9 @@ from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import (
     Moved,
-    derived,
     force_along,
     in_newtons,
+    moved_as,
     moved_plainly,
 )
 from hwid_cli.diagnosis.stand_in_fit import (
@@ -56,7 +56,7 @@ def force_in_newtons(
         return drive
     first_guess = None
     for row in _pushed_rows(given):
-        one, moved = signals[row], derived(given[row], signals[row].sample_time_s)
+        one, moved = signals[row], moved_as(signals[row], given[row])
         guess = _first_push(drive, one, moved)
         answered = _answered(runs, one, values, given[row], guess)
         if answered is None:
@@ -97,7 +97,7 @@ def _fitted_to_push(
         With the push.
     """
     one, runs = signals[row], (given[row], there)
-    moved = derived(given[row], one.sample_time_s)
+    moved = moved_as(one, given[row])
     answer = there.output - given[row].output
     beside, missed = fit_beside_integral(one, push, runs)
     if missed <= _MOST_UNBALANCED:
@@ -116,11 +116,11 @@ def _pushed_rows(given: Sequence[SimulatorRun]) -> list[int]:
 def _first_push(drive: StandIn, signals: Signals, moved: Moved) -> np.ndarray:
     """A push that moves a drive by a small share of its motion."""
     force = force_along(drive, moved, signals.driven_by)
-    plain = moved_plainly(drive, signals, force, moved).position
+    plain = signals.seen(moved_plainly(drive, signals, force, moved))
     # A spring that softens gives way to a large push for good.
     push = _test_push(signals) * _SMALL_PUSH * max(float(np.std(force)), 1e-300)
-    pushed = moved_plainly(drive, signals, force + push, moved).position - plain
-    size = float(np.std(moved.position))
+    pushed = signals.seen(moved_plainly(drive, signals, force + push, moved)) - plain
+    size = float(np.std(signals.seen(moved)))
     return np.asarray(push * (_PUSH * size / max(float(np.std(pushed)), 1e-300)))
 
 
@@ -137,8 +137,9 @@ def _told_by(
         Share of the answer's squares that differs.
     """
     force = force_along(drive, moved, signals.driven_by)
-    plain = moved_plainly(drive, signals, force, moved).position
-    expected = moved_plainly(drive, signals, force + push, moved).position - plain
+    plain = signals.seen(moved_plainly(drive, signals, force, moved))
+    there = moved_plainly(drive, signals, force + push, moved)
+    expected = signals.seen(there) - plain
     gain = float(expected @ answer) / max(float(expected @ expected), 1e-300)
     left = answer - gain * expected
     return gain, float(left @ left) / max(float(answer @ answer), 1e-300)

@@ -24,7 +24,7 @@ from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
 from hwid_cli.diagnosis.single_effects import single_in_simulation
 from hwid_cli.diagnosis.stand_in import change_between
-from hwid_cli.diagnosis.standing import ITS_OWN, standing_beside
+from hwid_cli.diagnosis.standing import its_own, standing_beside
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
 from hwid_cli.diagnosis.turns import have_moved
 from hwid_cli.diagnosis.untold import (
@@ -73,7 +73,7 @@ def diagnose_foreign(
     run_tasks = counted = CountedRuns(run_tasks)
     on_round = counted.told(on_round)
     held_out = held_out_of(recordings, options)
-    problem = prepare(recordings, ITS_OWN, options, held_out)
+    problem = prepare(recordings, its_own(simulator), options, held_out)
     problem = without_repeats(problem)
     on_round("the simulation as given", len(problem.signals))
     begun = begin(problem, simulator, options, run_tasks)

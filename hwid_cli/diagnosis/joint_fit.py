@@ -15,7 +15,7 @@ from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.parameters import ParameterLayout, ParameterPoint, residuals_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import fit_own, fit_point, within_bounds
-from hwid_cli.diagnosis.stand_in import Moved, derived, force_of_change
+from hwid_cli.diagnosis.stand_in import Moved, force_of_change, moved_as
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.programs import SimulatorRun
 
@@ -124,7 +124,9 @@ def pushes_of(
     return [
         np.column_stack(
             [
-                force_of_change(drive, _moved_by(column, one), run.output)
+                force_of_change(
+                    drive, _moved_by(column, one), moved_as(one, run).position
+                )
                 for column in slope.T
             ]
         )
@@ -133,7 +135,7 @@ def pushes_of(
 
 
 def _moved_by(change: np.ndarray, signals: Signals) -> Moved:
-    return derived(SimulatorRun(change, np.zeros(0)), signals.sample_time_s)
+    return moved_as(signals, SimulatorRun(change, np.zeros(0)))
 
 
 def _derivatives(

@@ -6,6 +6,7 @@ Whole recordings are held out, spread over kinds, sizes and speeds.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import scipy
@@ -31,6 +32,18 @@ _EXTREMES: tuple[Callable[[Recording], float], ...] = (
     lambda one: float(np.max(np.abs(one.input))),
     lambda one: float(np.max(np.abs(np.diff(one.output)))) / one.sample_time_s,
 )
+
+
+class HasMotion(Protocol):
+    """Position and velocity at every sample."""
+
+    @property
+    def position(self) -> np.ndarray:
+        """Shape (n_samples,), [m]."""
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Shape (n_samples,), [m/s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +116,10 @@ class Signals:
         if self.is_velocity or self.output.size < 2:
             return self.output if self.is_velocity else np.zeros(self.output.size)
         return np.gradient(self.output, self.sample_time_s)
+
+    def seen(self, motion: HasMotion) -> np.ndarray:
+        """What a sensor without effects shows of a motion, [output unit]."""
+        return motion.velocity if self.is_velocity else motion.position
 
     @cached_property
     def finely_driven_by(self) -> np.ndarray:

@@ -105,7 +105,9 @@ def begin(
     if above:
         drive = fit_stand_in(problem.signals, given)
         is_free = drive.stiffness_N_per_m == 0 and drive.bends == (0.0, 0.0)
-        starts = RunStarts(above, are_places=is_free)
+        # Of a velocity none shows where a machine is.
+        is_place = is_free and simulator.output == "position"
+        starts = RunStarts(above, are_places=is_place)
         runs = replace(runs, starts=starts.of_places)
         given = runs.from_starts(problem.signals, given)
     signals = starts.taken_off(problem.signals)

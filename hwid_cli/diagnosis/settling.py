@@ -16,7 +16,7 @@ from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.simulator import Runs
-from hwid_cli.diagnosis.stand_in import derived, force_along, standing_for
+from hwid_cli.diagnosis.stand_in import force_along, moved_as, standing_for
 from hwid_cli.diagnosis.standing import standing_beside
 from hwid_cli.diagnosis.turns import (
     Turn,
@@ -148,6 +148,6 @@ def _standing_with(
         With the force.
     """
     plain = replace(drive, effects={})
-    along = force_along(plain, derived(found, signals.sample_time_s), signals.driven_by)
+    along = force_along(plain, moved_as(signals, found), signals.driven_by)
     there = standing_for(signals, found, plain, along)
     return replace(there, force=along - force, start=there.own_start)

@@ -42,6 +42,8 @@ class Simulator:
         Effects that were added to it before.
     change : StandInChange
         Of the drive that stands for it, added before.
+    output : str
+        What is compared; one of ``records.drive.OUTPUTS``.
     """
 
     capabilities: Capabilities
@@ -51,6 +53,7 @@ class Simulator:
     values: Mapping[str, float] = field(default_factory=dict)
     effects: Mapping[str, Mapping[str, float | str]] = field(default_factory=dict)
     change: StandInChange = field(default_factory=StandInChange)
+    output: str = "position"
 
     @property
     def is_extended(self) -> bool:

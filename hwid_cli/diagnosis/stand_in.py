@@ -53,13 +53,21 @@ class Moved:
     acceleration: np.ndarray
 
 
-def derived(found: SimulatorRun, sample_time_s: float) -> Moved:
+def derived(
+    found: SimulatorRun, sample_time_s: float, *, is_velocity: bool = False
+) -> Moved:
     """Motion of a run, with derivatives from a spline through its samples.
 
     A run from rest is continued to before its start by its mirror image: a spline alone
     takes the bend there for a velocity and a force.
+
+    Parameters
+    ----------
+    is_velocity : bool
+        Whether its output is a velocity; its way counts from the first sample then.
     """
-    n_before = _MIRRORED if _rests_at_first(found.output) else 0
+    rests = _stands_at_first if is_velocity else _rests_at_first
+    n_before = _MIRRORED if rests(found.output) else 0
     n_before = min(n_before, found.output.size - 1)
     size = found.output.size + n_before
     time = sample_time_s * (np.arange(size) - n_before)
@@ -70,6 +78,10 @@ def derived(found: SimulatorRun, sample_time_s: float) -> Moved:
         degree = min(_DEGREE, size - 1)
         return scipy.interpolate.make_interp_spline(time, np.r_[before, values], degree)
 
+    if is_velocity:
+        speed = spline(found.output, -1.0)
+        way = speed.antiderivative()
+        return Moved(way(inside) - way(0.0), found.output, speed.derivative()(inside))
     if found.velocity.size:
         slope = spline(found.velocity, -1.0).derivative()
         return Moved(found.output, found.velocity, slope(inside))
@@ -83,6 +95,16 @@ def _rests_at_first(output: np.ndarray) -> bool:
         return False
     first, second = np.abs(np.diff(output[:3]))
     return bool(first <= _STEP_FROM_REST * second)
+
+
+def _stands_at_first(velocity: np.ndarray) -> bool:
+    """Whether a velocity begins at rest."""
+    return abs(float(velocity[0])) <= STILL * float(np.max(np.abs(velocity)))
+
+
+def moved_as(signals: Signals, found: SimulatorRun) -> Moved:
+    """Motion of a run of what the signals are of."""
+    return derived(found, signals.sample_time_s, is_velocity=signals.is_velocity)
 
 
 def with_change(drive: StandIn, change: StandInChange) -> StandIn:
@@ -182,13 +204,13 @@ def standing_for(
         With it, and without any effect, the stand-in's output and that of the run differ
         by an offset that is small.
     """
-    moved = derived(found, signals.sample_time_s)
+    moved = moved_as(signals, found)
     start = start_of(moved)
     plain = moved_plainly(drive, signals, force, moved)
     return replace(
         signals,
         force=force,
-        offset=found.output - plain.position,
+        offset=found.output - signals.seen(plain),
         own_start=seen_start(moved),
         start=start if drive.stiffness_N_per_m > 0 else signals.start,
     )
@@ -217,10 +239,7 @@ def error_of(
     ----------
     docs/method_diagnosis.md, eq. (D33b).
     """
-    moved = [
-        derived(found, one.sample_time_s)
-        for one, found in zip(signals, runs, strict=True)
-    ]
+    moved = [moved_as(one, run) for one, run in zip(signals, runs, strict=True)]
     forces = [
         force_along(drive, there, one.driven_by)
         for one, there in zip(signals, moved, strict=True)
@@ -228,14 +247,15 @@ def error_of(
     bend = _bend_along(moved, forces)
     total = 0.0
     for one, there, force in zip(signals, moved, forces, strict=True):
-        as_run = moved_plainly(drive, one, force, there).position
+        as_run = one.seen(moved_plainly(drive, one, force, there))
         more = bend(one.position) - bend(there.position)
-        bent = moved_plainly(drive, one, force + more, there).position - as_run
+        bent = one.seen(moved_plainly(drive, one, force + more, there)) - as_run
         total += float(np.sum(bent[one.evaluated] ** 2))
-        plain = moved_plainly(drive, one, 0.0 * force, there).position
-        size = float(np.sum((there.position - there.position[0]) ** 2))
-        share = float(np.sum((there.position - plain) ** 2)) / size if size > 0 else 0.0
-        gap = one.compared - there.position
+        plain = one.seen(moved_plainly(drive, one, 0.0 * force, there))
+        shown = one.seen(there)
+        size = float(np.sum((shown - shown[0]) ** 2))
+        share = float(np.sum((shown - plain) ** 2)) / size if size > 0 else 0.0
+        gap = one.compared - shown
         total += _SLOPE_OF_BEND**2 * share * float(np.sum(gap[one.evaluated] ** 2))
     return total
 
@@ -325,22 +345,26 @@ def corrected(
     force : ndarray, shape (n_samples,), [N]
         Of the effect, with which it has to lead there.
     """
-    step, nothing = signals.sample_time_s, np.zeros(0)
+    nothing = np.zeros(0)
     added = late if signals.offset is None else late + signals.offset
-    change = derived(SimulatorRun(added, nothing), step)
+    change = moved_as(signals, SimulatorRun(added, nothing))
+    there = moved_as(signals, SimulatorRun(target, nothing))
     # Half way between where it was and where it has to be.
-    more = signals.force + _slow(force_of_change(drive, change, target - 0.5 * added))
-    there = derived(SimulatorRun(target, nothing), step)
+    place = there.position - 0.5 * change.position
+    more = signals.force + _slow(force_of_change(drive, change, place))
     start = start_of(there) or signals.own_start
     plain = moved_from(start, drive, signals, more + force)
-    return replace(signals, force=more, offset=target - plain.position, start=start)
+    return replace(
+        signals, force=more, offset=target - signals.seen(plain), start=start
+    )
 
 
 def starts_in_balance(signals: Signals, found: SimulatorRun) -> bool:
     """Whether a force at the first sample moves where a simulation starts."""
     own = signals.own_start
     reach = _SAME_START * float(np.ptp(found.output))
-    return own is None or abs(float(found.output[0]) - own[0]) > reach
+    first = float(found.output[0])
+    return own is None or abs(first - own[int(signals.is_velocity)]) > reach
 
 
 def _slow(force: np.ndarray) -> np.ndarray:

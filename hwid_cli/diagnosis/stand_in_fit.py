@@ -20,9 +20,9 @@ from hwid_cli.diagnosis.search import fit_point
 from hwid_cli.diagnosis.stand_in import (
     STILL,
     Moved,
-    derived,
     force_along,
     in_newtons,
+    moved_as,
     moved_from,
     seen_start,
 )
@@ -81,7 +81,8 @@ def fit_stand_in(
     """
     straight = _by_regression(signals, runs)
     curved = _by_regression(signals, runs, is_curved=True)
-    widest = _PUSHES_BACK * max(float(np.max(np.abs(one.output))) for one in runs)
+    ways = [moved_as(one, run).position for one, run in zip(signals, runs, strict=True)]
+    widest = _PUSHES_BACK * max(float(np.max(np.abs(one))) for one in ways)
     is_nearer = straight.left > _STRAIGHT and curved.left <= _CURVED * straight.left
     is_curved = may_curve and is_nearer and _pushes_back(curved.drive, widest)
     best = curved if is_curved else straight
@@ -160,7 +161,7 @@ def fit_beside_integral(
     float, [-]
         Share of the push's squares that all of them leave.
     """
-    moved = derived(_answer_to_push(runs), signals.sample_time_s)
+    moved = moved_as(signals, _answer_to_push(runs))
     sum_s = signals.sample_time_s * np.cumsum(moved.position)
     matrix = np.column_stack([
         moved.acceleration, moved.velocity, moved.position, sum_s
@@ -169,7 +170,11 @@ def fit_beside_integral(
     values, left = scipy.optimize.nnls(matrix / lengths, push)
     mass, damping, stiffness, _ = values / lengths
     drive = StandIn(
-        max(float(mass), _LEAST_MASS), float(damping), float(stiffness), 1.0
+        max(float(mass), _LEAST_MASS),
+        float(damping),
+        float(stiffness),
+        1.0,
+        output=_output_of(signals),
     )
     drive = _no_faster_than_seen(drive, [signals])
     return drive, float(left**2 / max(float(push @ push), 1e-300))
@@ -194,7 +199,7 @@ def gain_beside_friction(
     float, [-]
         Its standard error as a share of it.
     """
-    moved = derived(there, signals.sample_time_s)
+    moved = moved_as(signals, there)
     used = _moves(moved)
     columns = np.column_stack([
         -push, moved.acceleration, moved.velocity, moved.position,
@@ -247,7 +252,7 @@ def with_input_of(
     without = replace(drive, force_constant_N_per_A=0.0)
     constants = []
     for one, found in zip(signals, runs, strict=True):
-        moved = derived(found, one.sample_time_s)
+        moved = moved_as(one, found)
         force = force_along(without, moved, one.driven_by)
         driven_by = one.driven_by - np.mean(one.driven_by)
         size = float(driven_by @ driven_by)
@@ -291,7 +296,7 @@ def _by_regression(
     """
     rows, right = [], []
     for one, found in zip(signals, runs, strict=True):
-        moved = derived(found, one.sample_time_s)
+        moved = moved_as(one, found)
         size = float(np.std(one.driven_by)) or 1.0
         # What may have either sign is two columns that are not negative.
         signed = [np.ones(one.driven_by.size)]
@@ -305,7 +310,13 @@ def _by_regression(
             used = _moves(moved)
         rows.append(np.column_stack(columns)[used] / size)
         right.append(one.driven_by[used] / size)
-    return _balanced(np.concatenate(rows), np.concatenate(right), is_curved=is_curved)
+    best = _balanced(np.concatenate(rows), np.concatenate(right), is_curved=is_curved)
+    return replace(best, drive=replace(best.drive, output=_output_of(signals[0])))
+
+
+def _output_of(signals: Signals) -> str:
+    """What is compared; one of ``records.drive.OUTPUTS``."""
+    return "velocity" if signals.is_velocity else "position"
 
 
 def _balanced(matrix: np.ndarray, vector: np.ndarray, *, is_curved: bool) -> _Balance:
@@ -353,7 +364,7 @@ def _as_moved(signals: Signals, found: SimulatorRun) -> Signals:
         compared=found.output,
         is_held_out=False,
         used=None,
-        start=seen_start(derived(found, signals.sample_time_s)),
+        start=seen_start(moved_as(signals, found)),
     )
 
 
@@ -412,7 +423,7 @@ def _left_in_free_run(drive: StandIn, moved: Sequence[Signals]) -> float:
     total = 0.0
     for one in moved:
         plain = moved_from(one.start, drive, one, np.zeros(one.driven_by.size))
-        left = one.compared - plain.position
+        left = one.compared - one.seen(plain)
         size = float(np.var(one.compared)) or 1.0
         total += float(np.mean(left**2)) / size
     return total

@@ -15,22 +15,27 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin
 from hwid_cli.diagnosis.simulator import Runs, Simulator
 from hwid_cli.diagnosis.stand_in import (
-    derived,
     error_of,
     force_along,
+    moved_as,
     standing_for,
     with_change,
 )
 from hwid_cli.diagnosis.stand_in_fit import fit_stand_in
 from hwid_cli.diagnosis.tasks import RunTasks
-from hwid_cli.records.axis import MotionUnits
+from hwid_cli.records.axis import MotionUnits, way_unit
 from hwid_cli.records.drive import LINE, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.programs import SimulatorRun
 from hwid_cli.records.recordings import Recording
 
-# How a command goes on between samples is the matter of the simulation itself.
-ITS_OWN = SimulationOptions(hold=LINE)
+
+def its_own(simulator: Simulator) -> SimulationOptions:
+    """What is known of any simulation.
+
+    How a command goes on between samples is a matter of its own.
+    """
+    return SimulationOptions(hold=LINE, output=simulator.output)
 
 
 def as_given(
@@ -48,7 +53,8 @@ def as_given(
     options : DiagnoseOptions
         Which of them are held out: laws that need a reference count from the others.
     """
-    problem = prepare(recordings, ITS_OWN, options, held_out_of(recordings, options))
+    held_out = held_out_of(recordings, options)
+    problem = prepare(recordings, its_own(simulator), options, held_out)
     return begin(problem, simulator, options, run_tasks)
 
 
@@ -103,7 +109,9 @@ def standing_beside(
         drive,
         effects={k: dict(v) for k, v in simulator.effects.items()},
         own_units=MotionUnits(
-            "N" if has_force else problem.input_unit, problem.unit, problem.input_unit
+            "N" if has_force else problem.input_unit,
+            way_unit(problem.unit) if drive.output == "velocity" else problem.unit,
+            problem.input_unit,
         ),
     )
     standing = _with_stand_in(problem, drive, given)
@@ -131,7 +139,7 @@ def _with_stand_in(
     """The problem of a drive that moves as the simulation did."""
     signals = []
     for one, found in zip(problem.signals, given, strict=True):
-        moved = derived(found, one.sample_time_s)
+        moved = moved_as(one, found)
         force = force_along(drive, moved, one.driven_by)
         signals.append(standing_for(one, found, replace(drive, effects={}), force))
     return replace(problem, signals=tuple(signals), drive=drive)

@@ -143,7 +143,7 @@ def _late(
 ) -> list[np.ndarray]:
     """How far runs are from what the stand-in had said."""
     return [
-        run.output - motion.position - (0.0 if one.offset is None else one.offset)
+        run.output - one.seen(motion) - (0.0 if one.offset is None else one.offset)
         for one, motion, run in zip(problem.signals, motions, found, strict=True)
     ]
 
@@ -273,7 +273,7 @@ def _left(
 ) -> tuple[np.ndarray, ...]:
     """What runs leave of the recordings; a sensor's effect is on top of a run."""
     return tuple(
-        (one.compared - run.output - (motion.output - motion.position))[one.evaluated]
+        (one.compared - run.output - (motion.output - one.seen(motion)))[one.evaluated]
         for one, motion, run in zip(problem.signals, motions, found, strict=True)
     )
 

@@ -6,6 +6,7 @@ from hwid_cli.errors import ConfigError
 from hwid_cli.export.c_drive import drive_source
 from hwid_cli.export.c_source import card_text, comment_lines, filled, number
 from hwid_cli.export.names import in_comment
+from hwid_cli.records.axis import way_unit
 from hwid_cli.records.exported import ExportedSimulation, ModelCard
 from hwid_cli.simulations.extended import ExtendedSimulation
 
@@ -59,6 +60,11 @@ def effect_source(
         {
             **card_text(card, sample_time_s),
             "effects": comment_lines(effects),
+            "way_unit": in_comment(
+                way_unit(card.output_unit)
+                if plain.output == "velocity"
+                else card.output_unit
+            ),
             "acts_as": in_comment(acts_as),
             "in_unit": "" if at_force else " / plain_gain",
             "drive": drive_source(exported),

@@ -14,6 +14,7 @@ from hwid_cli.drive.formula import NAMED_FUNCTIONS, as_text, parsed
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.errors import ConfigError
 from hwid_cli.export.names import identifier, in_comment
+from hwid_cli.records.axis import way_unit
 from hwid_cli.records.exported import ModelCard
 from hwid_cli.records.own_effects import ACTS_ON, own_of
 from hwid_cli.simulations.extended import ExtendedSimulation
@@ -169,7 +170,8 @@ def modelica_text(extended: ExtendedSimulation, card: ModelCard) -> str:
         [one for one in written if one.kind == "output"], _OUTPUT_ORDER
     )
     u, equations = _chain("u", commands)
-    y, of_output = _chain("x", readings)
+    is_velocity = extended.stand_in.output == "velocity"
+    y, of_output = _chain("v" if is_velocity else "x", readings)
     equations += of_output
     total = " + ".join(f"({_filled(one.law.text, one, u)})" for one in forces) or "0"
     inner = [_derivatives(one, u) for one in forces]
@@ -193,6 +195,8 @@ def _declared(
 ) -> list[str]:
     """Lines above the equations."""
     drive = extended.stand_in
+    is_velocity = drive.output == "velocity"
+    way = way_unit(card.output_unit) if is_velocity else card.output_unit
     inner = _inner([one for one in written if one.kind != "output"])
     of_reading = _inner([one for one in written if one.kind == "output"])
     return [
@@ -209,7 +213,7 @@ def _declared(
         f"  parameter Real v_rest = {_REST_SHARE * drive.reference_displacement_m!r}"
         ' "friction fades below this speed";',
         f'  input Real u "input of the simulation, {in_comment(card.input_unit)}";',
-        f'  input Real x "position of the simulation, {in_comment(card.output_unit)}";',
+        f'  input Real x "position of the simulation, {in_comment(way)}";',
         '  input Real v "velocity of the simulation, the same per second";',
         '  output Real force "acts on the simulation beside its input, N";',
         '  output Real u_acting "takes the place of the input";',

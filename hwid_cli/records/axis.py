@@ -149,6 +149,20 @@ def unit_in(units: MotionUnits, unit: str) -> str:
     return "/".join(" ".join(map(own, part.split(" "))) for part in unit.split("/"))
 
 
+def way_unit(of_velocity: str) -> str:
+    """Unit of the way that a velocity of this unit leads along.
+
+    Examples
+    --------
+    >>> way_unit("m/s"), way_unit("rad/s"), way_unit("rpm"), way_unit("")
+    ('m', 'rad', 'rpm s', '')
+    """
+    way, _, time = of_velocity.rpartition("/")
+    if way and time == "s":
+        return way
+    return f"{of_velocity} s" if of_velocity else ""
+
+
 def unit_of_effect(
     identifier: str, unit: str, *, axis: str, output: str, units: MotionUnits
 ) -> str:

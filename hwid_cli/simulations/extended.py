@@ -140,12 +140,12 @@ def _settled(
         if not np.isfinite(force).all():
             break
         found = simulate(_pushed(request, force, plain, at_force=at_force))
-        late = found.output - motion.position - signals.offset
+        late = found.output - signals.seen(motion) - signals.offset
         least = _NEGLIGIBLE * float(np.std(given.output))
         size = max(float(np.std(found.output - given.output)), least) or 1.0
         disagreement = float(np.sqrt(np.mean(late**2))) / size
         if disagreement < best.disagreement:
-            read = motion.output - motion.position
+            read = motion.output - signals.seen(motion)
             best = ExtendedRun(found.output + read, found.velocity, disagreement)
         if disagreement <= _AGREEMENT:
             break
@@ -157,14 +157,15 @@ def _settled(
 
 def _standing(plain: Drive, given: SimulatorRun, request: RunRequest) -> Signals:
     """What makes the stand-in without effects move as the simulation did."""
-    moved = derived(given, request.sample_time_s)
+    is_velocity = plain.output == "velocity"
+    moved = derived(given, request.sample_time_s, is_velocity=is_velocity)
     signals = Signals(
         request.name, "", request.input, given.output, request.input, given.output,
         request.sample_time_s, start=seen_start(moved), own_start=seen_start(moved),
-        force=force_along(plain, moved, request.input),
+        is_velocity=is_velocity, force=force_along(plain, moved, request.input),
     )  # fmt: skip
     there = moved_from(signals.start, plain, signals, signals.force)
-    return replace(signals, offset=given.output - there.position)
+    return replace(signals, offset=given.output - signals.seen(there))
 
 
 def _moved(stand_in: Drive, signals: Signals) -> Motion:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hwid_cli.data.units import quantity_of
 from hwid_cli.diagnosis.run_starts import Begun
 from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.diagnosis.stand_in import with_change
@@ -104,6 +105,7 @@ def _of_file(file: str, source: str) -> HammersteinWiener:
     return replace(found.model, sample_time_s=found.sample_time_s)
 
 
+_VELOCITIES = ("velocity", "angular velocity")
 # Fewer recordings than these say too little alone.
 _FEWEST_UNCOVERED = 3
 
@@ -183,7 +185,14 @@ def simulator_of(
         values=getattr(options, "values", {}),
         effects=options.effects,
         change=getattr(options, "stand_in", StandInChange()),
+        output=_compared(recordings),
     )
+
+
+def _compared(recordings: Sequence[Recording]) -> str:
+    """What the recordings are of; one of ``records.drive.OUTPUTS``."""
+    is_velocity = quantity_of(recordings[0].output_unit) in _VELOCITIES
+    return "velocity" if is_velocity else "position"
 
 
 def _given_outputs(

@@ -47,7 +47,7 @@ def simulate(time_s, inputs, parameters):
             k4 = rates(moved(y, h, k3), u[n] + b * du, push[n] + b * dpush, parameters)
             whole = [p + 2 * q + 2 * r + s for p, q, r, s in zip(k1, k2, k3, k4)]
             y = moved(y, h / 6, whole)
-    return {{"{output}": out[:, 0], "speed": out[:, 1]}}
+    return {{"{output}": out[:, {sees}]}}
 
 
 def moved(y, h, rate):
@@ -74,6 +74,8 @@ class Plant:
         Of the input.
     mass : float
         That an effect's force acts on, of state 1.
+    sees : int
+        The state that its sensor shows: 0 the position, 1 the speed.
     """
 
     name: str
@@ -88,6 +90,7 @@ class Plant:
     output: str = "displacement_m"
     steps: int = 4
     has_force: bool = True
+    sees: int = 0
 
     @property
     def text(self):
@@ -99,6 +102,7 @@ class Plant:
             size=self.n_states,
             input=self.input,
             output=self.output,
+            sees=self.sees,
             rates=self.rates,
         )
 
@@ -218,6 +222,11 @@ AMPLIFIED = replace(
 FAR_PLANTS = {one.name: one for one in (RUBBING, YIELDING, AMPLIFIED)}
 
 
+def with_tachometer(plant):
+    """The same with a sensor of its speed in place of the position's."""
+    return replace(plant, output="speed_m_per_s", sees=1)
+
+
 @dataclass(frozen=True)
 class Hidden:
     """What the machine has and the simulation lacks.
@@ -237,7 +246,7 @@ class Hidden:
     values: dict = field(default_factory=dict)
 
 
-def hidden_in(plant, load, x_max):
+def hidden_in(plant, load, x_max, y_max=None):
     """Effects of a size that the machine shows.
 
     Parameters
@@ -246,6 +255,8 @@ def hidden_in(plant, load, x_max):
         RMS of the force of the input on the mass.
     x_max : float
         Largest position without any effect.
+    y_max : float or None
+        Largest reading; None for the position.
     """
     stiff = load / x_max
     speed = x_max * np.sqrt(8 * stiff / plant.mass)
@@ -292,7 +303,7 @@ def hidden_in(plant, load, x_max):
         "sensor": Hidden(
             "sensor",
             (("sensor_quadratic",),),
-            output=lambda x: x + 0.08 * x**2 / x_max,
+            output=lambda y: y + 0.08 * y**2 / (y_max or x_max),
         ),
     }
 
@@ -309,7 +320,7 @@ def integrate(plant, values, u, dt, hidden=None, finer=10):
     y, out = [0.0] * plant.n_states, np.empty(u.size)
     given = u.tolist()
     for n in range(u.size):
-        out[n] = y[0]
+        out[n] = y[plant.sees]
         if n + 1 == u.size:
             break
         for j in range(count):

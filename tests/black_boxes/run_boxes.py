@@ -1,7 +1,7 @@
 """Diagnoses every black box and scores the verdicts.
 
 ``python -m tests.black_boxes.run_boxes --work DIR [--only PLANT/EFFECT ...] [--access python|outputs]
-[--noise 0.005] [--log-noise 0.01] [--write FILE.md]``. Rows are appended to the file as they come; boxes that it
+[--speed] [--noise 0.005] [--log-noise 0.01] [--write FILE.md]``. Rows are appended to the file as they come; boxes that it
 holds are not run again.
 """
 
@@ -12,11 +12,18 @@ import subprocess
 import sys
 import time
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from tests.black_boxes.plants import FAR_PLANTS, PLANTS, hidden_in, integrate
+from tests.black_boxes.plants import (
+    FAR_PLANTS,
+    PLANTS,
+    hidden_in,
+    integrate,
+    with_tachometer,
+)
 
 DT, N = 1e-3, 1200
 # By how much the given parameters are off.
@@ -50,12 +57,17 @@ def write_case(folder, plant, effect, *, access, noise, seed, most="", log_noise
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "raw").mkdir(exist_ok=True)
     signals = list(inputs(plant, rng))
-    plain = [integrate(plant, plant.values, u, DT, finer=1) for _, u in signals]
-    x_max = max(float(np.max(np.abs(one))) for one in plain)
+    x_max, y_max = (
+        max(
+            float(np.max(np.abs(integrate(one, one.values, u, DT, finer=1))))
+            for _, u in signals
+        )
+        for one in (replace(plant, sees=0), plant)
+    )
     rates, zero = plant.function(), np.zeros(plant.n_states)
     gain = _force_gain(rates, zero, plant)
     load = gain * float(np.sqrt(np.mean([np.mean(u**2) for _, u in signals])))
-    hidden = hidden_in(plant, load, x_max)[effect]
+    hidden = hidden_in(plant, load, x_max, y_max)[effect]
     given = {
         name: value * (1 + OFF * rng.choice([-1, 1])) if name in plant.free else value
         for name, value in plant.values.items()
@@ -65,7 +77,7 @@ def write_case(folder, plant, effect, *, access, noise, seed, most="", log_noise
     t = DT * np.arange(N)
     for name, u in signals:
         y = integrate(plant, plant.values, u, DT, hidden)
-        y = y + noise * x_max * rng.standard_normal(N)
+        y = y + noise * y_max * rng.standard_normal(N)
         logged = u
         if log_noise:
             logged = u + log_noise * np.sqrt(np.mean(u**2)) * rng.standard_normal(N)
@@ -208,6 +220,9 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--singles", action="store_true", help="no sets, no laws")
     parser.add_argument("--far", action="store_true", help="plants far from a drive")
+    parser.add_argument(
+        "--speed", action="store_true", help="its sensor is a tachometer"
+    )
     parser.add_argument("--write", type=Path)
     options = parser.parse_args()
     kept = options.write.read_text() if options.write and options.write.exists() else ""
@@ -238,6 +253,7 @@ HEAD = (
 
 def run_box(label, plant, effect, options):
     """Make a box, have it diagnosed, and score it: a row of the table."""
+    plant = with_tachometer(plant) if options.speed else plant
     folder = options.work / plant.name / effect
     write_case(
         folder, plant, effect,

@@ -19,7 +19,7 @@ from hwid_cli.drive.simulation import NO_FORCE
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.diagnosis import BaseParameter
-from hwid_cli.records.experiment import DiagnoseOptions
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.programs import (
     Capabilities,
     FreeParameter,
@@ -629,7 +629,9 @@ def test_a_trial_without_an_answer_ends_no_search_for_the_parameters():
             raise SimulationError("gave nan")
         return simulate(request)
 
-    of = foreign.prepare(recordings(), foreign.ITS_OWN, DiagnoseOptions(), ())
+    of = foreign.prepare(
+        recordings(), SimulationOptions(hold="linear"), DiagnoseOptions(), ()
+    )
     able = Capabilities(run=True, parameters=True)
     runs = Runs(Simulator(able, fragile, {}, FREE, GIVEN), Count())
     found = foreign.fit_parameters(runs.tried, of.signals, FREE, GIVEN)

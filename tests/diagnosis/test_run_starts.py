@@ -9,7 +9,7 @@ from scipy.signal import lsim
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.run_starts import begin, starts_above, starts_sentence
 from hwid_cli.diagnosis.simulator import Simulator
-from hwid_cli.diagnosis.standing import ITS_OWN, prepare
+from hwid_cli.diagnosis.standing import its_own, prepare
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities, SimulatorRun
 from hwid_cli.records.recordings import Recording
@@ -110,7 +110,7 @@ def test_a_free_axis_runs_from_its_start_and_a_spring_has_a_sensor_with_a_zero(
 
     simulator, options = Simulator(ABLE, run, {}, {}, {}), DiagnoseOptions()
     found = recordings(STARTS, stiffness)
-    problem = prepare(found, ITS_OWN, options, ())
+    problem = prepare(found, its_own(simulator), options, ())
     begun = begin(problem, simulator, options, Count())
     assert begun.starts.are_places == are_places
     firsts = [one.output[0] for one in begun.given]

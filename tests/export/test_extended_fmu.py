@@ -64,21 +64,22 @@ def request_of(current):
     return RunRequest("a", STEP_S, current, np.zeros(0), {})
 
 
-def extended_of(plant, effects):
+def extended_of(plant, effects, plain=ROUGH):
     base = replace(plant, parameters={"damping": 13.0})
-    return ExtendedSimulation(base, ROUGH, replace(ROUGH, effects=effects))
+    return ExtendedSimulation(base, plain, replace(plain, effects=effects))
 
 
-def differences(plant, effects, path):
+def differences(plant, effects, path, plain=ROUGH):
     """Between the FMU and the extended simulation, as shares of what the effects do."""
-    extended = extended_of(plant, effects)
+    extended = extended_of(plant, effects, plain)
     base = extended.base
     write_extended_fmu(path, extended, CARD, STEP_S)
     for name, current in CURRENTS.items():
         request = replace(request_of(current), parameters=base.values)
         bare = fmu.KIND.run(base, request).output
+        drives = extended.plain, extended.stand_in
         known = run_extended(
-            partial(fmu.KIND.run, base), request, (ROUGH, extended.stand_in),
+            partial(fmu.KIND.run, base), request, drives,
             has_force=base.force_input is not None,
         ).output  # fmt: skip
         # Nothing is set: the fitted parameters are its own.
@@ -100,6 +101,16 @@ def test_it_gives_what_the_extended_simulation_gives(plant, name, tmp_path):
 def test_without_a_velocity_or_a_force_input(plant, name, missing, tmp_path):
     few = replace(plant, **missing)
     for current, share in differences(few, EFFECTS[name], tmp_path / "a.fmu"):
+        assert share < 0.01, current
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["friction", "drag", "cubic", "lag", "both"])
+def test_where_the_velocity_is_measured(plant, name, tmp_path):
+    of_speed = replace(plant, output=plant.velocity, velocity=None)
+    plain = replace(ROUGH, output="velocity", reference_displacement_m=0.5)
+    found = differences(of_speed, EFFECTS[name], tmp_path / "a.fmu", plain)
+    for current, share in found:
         assert share < 0.01, current
 
 

@@ -5,8 +5,8 @@
  *
  * The simulation goes on in steps of @sample_time@ s. Before each of them hwid_effect_act
  * takes its input [@input_unit@] in the coming step, and returns @acts_as@; after
- * it hwid_effect_see takes position [@output_unit@] and velocity (NAN where nobody knows
- * it), and returns what the sensor reads:
+ * it hwid_effect_see takes position [@way_unit@] and velocity, and returns what the sensor
+ * reads [@output_unit@]. One of the two may be NAN where nobody knows it:
  *
  *     hwid_effect effect;
  *     hwid_effect_init(&effect);
@@ -54,6 +54,12 @@ void HWID_NAME(effect_init)(HWID_NAME(effect) *effect)
     effect->reading = 0.0;
 }
 
+/* What a sensor without effects shows of a position and a velocity. */
+static double shown(const double *p, double x, double v)
+{
+    return p[OUTPUT_IS_VELOCITY] > 0.0 ? v : x;
+}
+
 static void effect_read(HWID_NAME(effect) *effect, double x0, double v0)
 {
     HWID_NAME(state) *drive = &effect->drive;
@@ -63,7 +69,7 @@ static void effect_read(HWID_NAME(effect) *effect, double x0, double v0)
     } else if (!(p[OUTPUT_GAP] > 0.0)) {
         drive->played = drive->position;
     }
-    effect->reading = reading(drive) - drive->position;
+    effect->reading = reading(drive) - shown(p, drive->position, drive->velocity);
 }
 
 void HWID_NAME(effect_start)(HWID_NAME(effect) *effect, double u, double x)
@@ -73,7 +79,7 @@ void HWID_NAME(effect_start)(HWID_NAME(effect) *effect, double u, double x)
     drive->position = drive->motion[X];
     drive->velocity = drive->motion[V];
     drive->previous = u;
-    effect->offset = x - drive->position;
+    effect->offset = isnan(x) ? 0.0 : x - drive->position;
     effect->velocity = 0.0;
     effect_read(effect, drive->position, drive->velocity);
 }
@@ -102,7 +108,8 @@ double HWID_NAME(effect_see)(HWID_NAME(effect) *effect, double x, double v)
 {
     HWID_NAME(state) *drive = &effect->drive;
     const double x0 = drive->position, v0 = drive->velocity;
-    const double here = x - effect->offset;
+    const double gone = 0.5 * (effect->velocity + v) * sample_time;
+    const double here = isnan(x) ? x0 + gone : x - effect->offset;
     const double late = (here - drive->motion[X]) / sample_time;
     const int is_known = !isnan(v);
     const double now = is_known ? v : drive->motion[V] + late;
@@ -113,6 +120,6 @@ double HWID_NAME(effect_see)(HWID_NAME(effect) *effect, double x, double v)
     drive->velocity = now;
     effect->velocity = now;
     effect_read(effect, x0, v0);
-    return x + effect->reading;
+    return shown(drive->p, x, v) + effect->reading;
 }
 #endif

@@ -72,7 +72,8 @@ static void mdlOutputs(SimStruct *S, int_T tid)
     } else {
         (void)HWID_NAME(effect_see)(&memory->effect, x, v);
     }
-    *ssGetOutputPortRealSignal(S, 1) = x + memory->effect.reading;
+    *ssGetOutputPortRealSignal(S, 1) =
+        shown(memory->effect.drive.p, x, v) + memory->effect.reading;
     *ssGetOutputPortRealSignal(S, 0) = HWID_NAME(effect_act)(&memory->effect, u);
 }
 

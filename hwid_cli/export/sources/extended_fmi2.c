@@ -267,12 +267,14 @@ FMI_EXPORT fmi2Status fmi2Reset(fmi2Component c)
     return status > fmi2Warning ? status : begin_unit(unit);
 }
 
-/* Motion of the other unit now. */
+/* Motion of the other unit now; NAN for what it does not give. */
 static fmi2Status look(Unit *unit, fmi2Real *x, fmi2Real *v)
 {
-    fmi2Status status = unit->call.get_real(unit->base, &output_at, 1, x);
-    *v = NAN;
-    if (HAS_VELOCITY && status <= fmi2Warning) {
+    const int is_velocity = unit->effect.drive.p[OUTPUT_IS_VELOCITY] > 0.0;
+    fmi2Status status;
+    *x = *v = NAN;
+    status = unit->call.get_real(unit->base, &output_at, 1, is_velocity ? v : x);
+    if (!is_velocity && HAS_VELOCITY && status <= fmi2Warning) {
         status = unit->call.get_real(unit->base, &velocity_at, 1, v);
     }
     return status;
