@@ -83,7 +83,14 @@ def circle_starts(
         pole may.
     """
     few = thinned(experiments, _ROWS)
-    factors = [one for one in _factors(lasting, few) if one.size <= orders.nf + 1]
+    # Nothing that adds up rests under an input.
+    is_pushed = any(one.input[0] != 0.0 for one in experiments)
+    is_ruled_out = options.initial_state == "steady" and is_pushed
+    factors = [
+        one
+        for one in _factors(lasting, few)
+        if one.size <= orders.nf + 1 and not (is_ruled_out and _integrates(one))
+    ]
     has_states = options.initial_state == "estimated"
     joined = np.concatenate([one.input for one in experiments])
     ends = np.array([joined.min(), joined.max()])
@@ -103,6 +110,11 @@ def circle_starts(
         solved_ones = [one for one in of_factors if np.isfinite(one.cost)]
         chosen += sorted(solved_ones, key=lambda one: one.cost)[:_KEPT]
     return tuple(chosen)
+
+
+def _integrates(factor: np.ndarray) -> bool:
+    """Whether a polynomial has a root at 1."""
+    return bool(abs(factor.sum()) < _SINGULAR)
 
 
 def _factors(lasting: np.ndarray, experiments: Sequence[FitData]) -> list[np.ndarray]:
@@ -219,8 +231,8 @@ class _Iterations:
     @property
     def _has_level(self) -> bool:
         """An offset of the output; with an integrator it is an initial state."""
-        integrates = abs(self.factor.sum()) < _SINGULAR
-        return has_free_shape(self.options.output_map) and not integrates
+        is_free = has_free_shape(self.options.output_map)
+        return is_free and not _integrates(self.factor)
 
     def _parts(
         self,

@@ -269,7 +269,8 @@ def reestimate_lasting_block(
     on_circle = circle_starts(between, model.orders, known, lasting)
     begun += [(one,) for one in on_circle]
     found = []
-    for starts in begun:
+    # Equations without a solution give nothing to start from.
+    for starts in filter(None, begun):
         fitted = linear_search(between, known, starts).candidate
         block = fitted.model
         found.append(

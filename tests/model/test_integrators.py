@@ -1,10 +1,13 @@
 """Free axes and undamped modes: poles on the unit circle."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hwid_cli.model import initial_candidates
+from hwid_cli.model import initial_candidates, restart
+from hwid_cli.model.candidates import FitData
 from hwid_cli.model.circle_starts import circle_starts
 from hwid_cli.model.fit import fit
 from hwid_cli.model.normalise import integrates, normalise
@@ -127,6 +130,30 @@ def test_a_steady_integrator_is_fitted():
     found = fit([Recording("r", u, y, 1.0)], Orders(1, 1, 1), steady)
     # Two parameters and 605 samples: the deviation is that of the noise within 3 sigma.
     assert found.rmsd < 1.1 * size
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_what_starts_steady_under_an_input_is_no_integrator(order):
+    # A motor whose speed follows so slowly that it could be one; its first input is noise.
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.uniform(-1.0, 1.0, 40), 10) + 0.01 * rng.standard_normal(400)
+    y = lfilter([0.0, 0.02], [1.0, -0.99], u)
+    y = y + 0.01 * np.std(y) * rng.standard_normal(y.size)
+    steady = FitOptions(input_map="none", output_map="none", initial_state="steady")
+    experiments = [FitData(u, y)]
+    found = circle_starts(experiments, Orders(1, order, 1), steady, np.array([0.99]))
+    # What has modes alone may rest there.
+    assert all(abs(np.sum(one.denominator)) > 1e-6 for one in found)
+    free = replace(steady, initial_state="estimated")
+    assert circle_starts(experiments, Orders(1, order, 1), free, np.array([0.99]))
+
+
+@pytest.mark.thorough
+def test_equations_without_a_solution_end_no_fit(monkeypatch):
+    monkeypatch.setattr(restart, "block_starts", lambda *_: [])
+    plant = integrating_plant(1000, bent=True)
+    found = fit([plant.recording], plant.orders, WITH_MAP)
+    assert found.rmsd < 1.05 * plant.noise
 
 
 def test_where_an_integrator_starts_is_said_to_look_like_a_constant():
