@@ -9,7 +9,10 @@ from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.simulator import DIFFERENCE
 from hwid_cli.records.programs import FreeParameter, SimulatorRun
 
-_MOST_EVALUATIONS = 8
+# Evaluations of a search; it goes on, so many times at most, where the last few of them
+# have still brought it below this share. Near a resonance it is far from its end.
+_MOST_EVALUATIONS, _MOST_SEARCHES = 8, 4
+_LAST_FEW, _STILL_FALLS = 3, 0.8
 # Recordings that they are fitted to.
 _MOST_FITTED = 6
 
@@ -39,47 +42,94 @@ def fit_parameters(
     sizes = np.array([abs(one.value) or 1.0 for one in free.values()])
     limits = [one.limits for one in free.values()]
     low, high = (np.array(ends) / sizes for ends in zip(*limits, strict=True))
-    n_errors = sum(one.n_evaluated for one in chosen)
+    gap = _Gap(ask, chosen, values, dict(zip(free, sizes.tolist(), strict=True)), high)
+    start = np.clip(np.array([values[name] for name in free]) / sizes, low, high)
+    if not np.isfinite(gap.errors(start)).all():
+        return values
+    for _ in range(_MOST_SEARCHES):
+        found = scipy.optimize.least_squares(
+            gap.errors, start, gap.slopes, (low, high), x_scale=1.0,
+            max_nfev=_MOST_EVALUATIONS, ftol=1e-6, xtol=1e-5,
+        )  # fmt: skip
+        start = found.x
+        if found.status > 0 or not gap.falls:
+            break
+    return gap.at(start)
 
-    def at(coordinates: np.ndarray) -> dict[str, float]:
-        new = (coordinates * sizes).tolist()
-        return {**values, **dict(zip(free, new, strict=True))}
 
-    def errors(coordinates: np.ndarray) -> np.ndarray:
-        found = ask(chosen, at(coordinates))
-        # From there the search takes a shorter step.
-        return np.full(n_errors, np.inf) if found is None else _errors(chosen, found)
+class _Gap:
+    """What a simulation leaves of recordings, by its parameters over their sizes.
 
-    def slopes(coordinates: np.ndarray) -> np.ndarray:
-        here = errors(coordinates)
+    Parameters
+    ----------
+    sizes : dict of str to float
+        Of the free parameters.
+    high : ndarray, shape (n_free,), [-]
+        Beyond which no difference may reach.
+    """
+
+    def __init__(
+        self,
+        ask: Ask,
+        signals: Sequence[Signals],
+        values: Mapping[str, float],
+        sizes: dict[str, float],
+        high: np.ndarray,
+    ) -> None:
+        self._ask, self._signals, self._high = ask, signals, high
+        self._values, self._sizes = values, sizes
+        self._size = sum(one.n_evaluated for one in signals)
+        self._costs: list[float] = []
+        # A search that goes on begins where its last part has been.
+        self._asked: dict[bytes, np.ndarray] = {}
+        self._sloped: tuple[bytes, np.ndarray] | None = None
+
+    @property
+    def falls(self) -> bool:
+        """Whether the last few evaluations have left clearly less than those before."""
+        return min(self._costs) < _STILL_FALLS * min(self._costs[:-_LAST_FEW])
+
+    def at(self, coordinates: np.ndarray) -> dict[str, float]:
+        """All parameters."""
+        pairs = zip(self._sizes.items(), coordinates.tolist(), strict=True)
+        return {**self._values, **{name: size * q for (name, size), q in pairs}}
+
+    def errors(self, coordinates: np.ndarray) -> np.ndarray:
+        """Measured less simulated; infinite where no run is possible.
+
+        From there a search takes a shorter step.
+        """
+        place = coordinates.tobytes()
+        if place not in self._asked:
+            left = self._asked[place] = self._left(coordinates)
+            self._costs.append(float(left @ left))
+        return self._asked[place]
+
+    def slopes(self, coordinates: np.ndarray) -> np.ndarray:
+        """Derivatives of the errors, by differences."""
+        place = coordinates.tobytes()
+        if self._sloped is None or self._sloped[0] != place:
+            self._sloped = place, self._differences(coordinates)
+        return self._sloped[1]
+
+    def _differences(self, coordinates: np.ndarray) -> np.ndarray:
+        here = self.errors(coordinates)
         columns = []
-        for column in range(len(sizes)):
-            step = (
-                DIFFERENCE
-                if coordinates[column] + DIFFERENCE <= high[column]
-                else (-DIFFERENCE)
-            )
+        for column in range(coordinates.size):
             moved = coordinates.copy()
+            is_inside = moved[column] + DIFFERENCE <= self._high[column]
+            step = DIFFERENCE if is_inside else -DIFFERENCE
             moved[column] += step
-            slope = (errors(moved) - here) / step
+            slope = (self._left(moved) - here) / step
             # At the edge of what it can be run with, a parameter stays.
-            columns.append(slope if np.isfinite(slope).all() else np.zeros(n_errors))
+            columns.append(slope if np.isfinite(slope).all() else np.zeros(here.size))
         return np.column_stack(columns)
 
-    start = np.array([values[name] for name in free]) / sizes
-    if not np.isfinite(errors(np.clip(start, low, high))).all():
-        return values
-    found = scipy.optimize.least_squares(
-        errors, np.clip(start, low, high), slopes, (low, high), x_scale=1.0,
-        max_nfev=_MOST_EVALUATIONS, ftol=1e-6, xtol=1e-5,
-    )  # fmt: skip
-    return at(found.x)
-
-
-def _errors(signals: Sequence[Signals], found: Sequence[SimulatorRun]) -> np.ndarray:
-    return np.concatenate(
-        [
-            (one.compared - run.output)[one.evaluated]
-            for one, run in zip(signals, found, strict=True)
-        ]
-    )
+    def _left(self, coordinates: np.ndarray) -> np.ndarray:
+        found = self._ask(self._signals, self.at(coordinates))
+        if found is None:
+            return np.full(self._size, np.inf)
+        pairs = zip(self._signals, found, strict=True)
+        return np.concatenate(
+            [(one.compared - run.output)[one.evaluated] for one, run in pairs]
+        )

@@ -1,0 +1,62 @@
+"""Fit of the parameters of a user's own simulation."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis.own_parameters import fit_parameters
+from hwid_cli.records.programs import FreeParameter, SimulatorRun
+
+FREE = {
+    "a": FreeParameter(-1.2, (-5.0, 5.0)),
+    "b": FreeParameter(1.0, (-5.0, 5.0)),
+}
+
+
+class Valley:
+    """A simulation whose gap is a bent valley (Rosenbrock, 1960), with its end at 1, 1."""
+
+    def __init__(self, floor=0.0):
+        self.asked, self.floor = [], floor
+
+    def __call__(self, signals, values):
+        a, b = values["a"], values["b"]
+        self.asked.append((a, b))
+        output = np.array([10 * (b - a**2), 1 - a, self.floor])
+        return [SimulatorRun(output, np.zeros(0)) for _ in signals]
+
+
+def signals():
+    return [
+        SimpleNamespace(
+            compared=np.zeros(3), evaluated=slice(None), n_evaluated=3,
+            is_held_out=False,
+        )
+    ]  # fmt: skip
+
+
+def fitted(valley):
+    values = {name: one.value for name, one in FREE.items()}
+    return fit_parameters(valley, signals(), FREE, values)
+
+
+def test_a_search_that_still_leaves_less_goes_on_to_its_end():
+    # Eight evaluations end half way along the valley.
+    valley = Valley()
+    found = fitted(valley)
+    assert found == pytest.approx({"a": 1.0, "b": 1.0}, abs=1e-3)
+
+
+def test_a_search_that_hardly_leaves_less_ends():
+    # Beside a far larger gap, which no parameter closes, the valley is nothing.
+    valley = Valley(floor=100.0)
+    found = fitted(valley)
+    assert found["a"] < 0.9
+    assert len(valley.asked) <= 8 * 3 + 1
+
+
+def test_no_run_is_asked_for_twice_in_a_search():
+    valley = Valley()
+    fitted(valley)
+    assert len(set(valley.asked)) == len(valley.asked)
