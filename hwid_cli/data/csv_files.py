@@ -407,9 +407,21 @@ def _read_body(
             inside = _while_inside(rows, number + len(lines))
             block = [(end, row) for end, row in inside if row[0] not in begins]
             _check_widths(sheet, block)
-            parts.add_cells(_without_torn_cells(block, sheet.width))
+            is_cut = not lines[-1].endswith(("\n", "\r"))
+            whole = _without_cut_row(block, sheet.width) if is_cut else block
+            parts.add_cells(_without_torn_cells(whole, sheet.width))
             number += source.count
     return parts.columns()
+
+
+def _without_cut_row(
+    block: list[tuple[int, list[str]]], width: int
+) -> list[tuple[int, list[str]]]:
+    """Rows without a last one that was still being written: it has no end, and few cells."""
+    if len(block) < 2:
+        return block
+    (_, before), (_, last) = block[-2:]
+    return block[:-1] if len(last) < width <= len(before) else block
 
 
 def _without_torn_cells(
@@ -506,7 +518,9 @@ def _plain_table(
     if '"' in text or _COMMENT in text or not all(map(str.strip, lines)):
         return None
     mark = sheet.separator
-    if mark != " " and max(map(str.count, lines, repeat(mark))) >= max(sheet.width, 1):
+    counts = set(map(str.count, lines, repeat(mark)))
+    if mark != " " and (max(counts) >= max(sheet.width, 1) or len(counts) > 1):
+        # Too many cells are a fault; a row with too few of them is torn.
         return None
     decimal = "," if mark != "," and "," in text else "." if "." in text else ""
     if decimal and not parts.are_decimal(decimal):
