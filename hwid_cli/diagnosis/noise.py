@@ -26,6 +26,8 @@ from hwid_cli.trust.repeats import is_same_input
 
 FEWEST_AT_REST = 30
 _FEWEST_RESTS = 3
+# What a motion that all rests begin with leaves of them is less than this share, [-].
+_LEFT_OF_COMMON = 0.3
 # Orders of differences: the second where the first still sees motion or colour.
 _ORDER, _HIGHER_ORDER = 6, 16
 _SEES_MOTION = 0.7
@@ -353,6 +355,7 @@ def _from_rest(all_signals: Sequence[Signals], may_move: bool) -> Stretch | None
         pieces = [one for one, size in zip(pieces, sizes, strict=True) if size <= most]
     if len(pieces) < _FEWEST_RESTS:
         return None
+    pieces = _without_common_motion(pieces)
     own = [piece - piece.mean() for piece in pieces]
     if pooled_rms(own) <= 1e-12 * max(float(np.max(np.abs(one.compared)))
                                 for one in all_signals):  # fmt: skip
@@ -363,6 +366,21 @@ def _from_rest(all_signals: Sequence[Signals], may_move: bool) -> Stretch | None
     is_common = float(np.std(means)) < pooled_rms(own)
     around = [piece - np.mean(np.concatenate(pieces)) for piece in pieces]
     return _stretch(own, around if is_common else own)
+
+
+def _without_common_motion(pieces: list[np.ndarray]) -> list[np.ndarray]:
+    """Pieces without the motion that all of them begin with, as when a brake lets go.
+
+    Noise differs from recording to recording: less than this share of it would be left.
+    """
+    length, count = min(piece.size for piece in pieces), len(pieces)
+    cut = [piece[:length] for piece in pieces]
+    common = np.mean(cut, axis=0)
+    # One degree of freedom of each sample goes into the mean.
+    alone = [np.sqrt(count / (count - 1)) * (piece - common) for piece in cut]
+    left = pooled_rms([one - one.mean() for one in alone])
+    whole = pooled_rms([one - one.mean() for one in cut])
+    return alone if left < _LEFT_OF_COMMON * whole else pieces
 
 
 def _stretch(own: list[np.ndarray], around: list[np.ndarray]) -> Stretch:
