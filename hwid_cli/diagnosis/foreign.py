@@ -16,6 +16,7 @@ from hwid_cli.diagnosis.causes import without_repeats
 from hwid_cli.diagnosis.confirmation import confirm
 from hwid_cli.diagnosis.diagnose import find, held_out_of
 from hwid_cli.diagnosis.findings import Findings, describe
+from hwid_cli.diagnosis.further_effects import with_further_effect
 from hwid_cli.diagnosis.laws import MOST_OF_NAMED
 from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
@@ -205,6 +206,10 @@ def _found(
             return confirm(found, runs, values)
     if runs.simulator.run is None:
         standing = _with_nearer_spring(standing, singles, runs.run_tasks, on_round)
+    if alone is not None:
+        alone = with_further_effect(alone, runs, options, on_round)
+        if alone.findings is not None and alone.is_all:
+            return alone.findings, alone.values, True
     one = None if alone is None else alone.findings
     # What a stand-in leaves of an effect that runs bear out is its own error: pieces,
     # which are asked where nothing is settled, would only repeat it.

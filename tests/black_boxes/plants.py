@@ -308,6 +308,31 @@ def hidden_in(plant, load, x_max, y_max=None):
     }
 
 
+# Two at a time, which act at different places.
+_PAIRS = (
+    ("coulomb", "delay"), ("cubic", "dead_zone"), ("drag", "sensor"),
+    ("stop", "saturation"),
+)  # fmt: skip
+
+
+def pairs_in(plant, load, x_max, y_max=None):
+    """The same two at a time."""
+    single = hidden_in(plant, load, x_max, y_max)
+    return {f"{one}+{two}": _both(single[one], single[two]) for one, two in _PAIRS}
+
+
+def _both(one, two):
+    (((first,),), ((second,),)) = one.accepted, two.accepted
+    return Hidden(
+        f"{one.name}+{two.name}",
+        (tuple(sorted((first, second))),),
+        dry=one.dry + two.dry,
+        force=one.force or two.force,
+        command=one.command or two.command,
+        output=one.output or two.output,
+    )
+
+
 def integrate(plant, values, u, dt, hidden=None, finer=10):
     """The truth: semi-implicit midpoint in short steps, with friction that holds."""
     rates, hidden = plant.function(), hidden or Hidden("none", ())

@@ -1,7 +1,7 @@
 """Diagnoses every black box and scores the verdicts.
 
 ``python -m tests.black_boxes.run_boxes --work DIR [--only PLANT/EFFECT ...] [--access python|outputs]
-[--speed] [--noise 0.005] [--log-noise 0.01] [--write FILE.md]``. Rows are appended to the file as they come; boxes that it
+[--speed] [--pairs] [--noise 0.005] [--log-noise 0.01] [--write FILE.md]``. Rows are appended to the file as they come; boxes that it
 holds are not run again.
 """
 
@@ -22,6 +22,7 @@ from tests.black_boxes.plants import (
     PLANTS,
     hidden_in,
     integrate,
+    pairs_in,
     with_tachometer,
 )
 
@@ -67,7 +68,8 @@ def write_case(folder, plant, effect, *, access, noise, seed, most="", log_noise
     rates, zero = plant.function(), np.zeros(plant.n_states)
     gain = _force_gain(rates, zero, plant)
     load = gain * float(np.sqrt(np.mean([np.mean(u**2) for _, u in signals])))
-    hidden = hidden_in(plant, load, x_max, y_max)[effect]
+    make = pairs_in if "+" in effect else hidden_in
+    hidden = make(plant, load, x_max, y_max)[effect]
     given = {
         name: value * (1 + OFF * rng.choice([-1, 1])) if name in plant.free else value
         for name, value in plant.values.items()
@@ -223,6 +225,7 @@ def main():
     parser.add_argument(
         "--speed", action="store_true", help="its sensor is a tachometer"
     )
+    parser.add_argument("--pairs", action="store_true", help="two effects at a time")
     parser.add_argument("--write", type=Path)
     options = parser.parse_args()
     kept = options.write.read_text() if options.write and options.write.exists() else ""
@@ -230,7 +233,8 @@ def main():
         options.write.write_text(HEAD)
     words = []
     for name, plant in (FAR_PLANTS if options.far else PLANTS).items():
-        for effect in hidden_in(plant, 1.0, 1.0):
+        make = pairs_in if options.pairs else hidden_in
+        for effect in make(plant, 1.0, 1.0):
             label = f"{name}/{effect}"
             if options.only and not any(one in label for one in options.only):
                 continue

@@ -1,0 +1,80 @@
+"""A second effect, beside one that the simulation's own run bears out."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis import foreign, further_effects
+from hwid_cli.diagnosis.further_effects import with_further_effect
+from hwid_cli.diagnosis.simulator import Simulator
+from hwid_cli.diagnosis.single_effects import BySingleEffects
+from hwid_cli.records.candidates import ParameterRef
+from hwid_cli.records.experiment import DiagnoseOptions
+from hwid_cli.records.programs import Capabilities
+from tests.black_boxes.plants import Hidden
+from tests.diagnosis.made_up_fits import made_up
+from tests.diagnosis.test_foreign import FREE, GIVEN, TRUE, diagnosis, simulate
+
+FEW = ("coulomb_friction", "quadratic_drag", "cubic_stiffness", "input_delay")
+
+
+@pytest.mark.thorough
+def test_a_second_effect_is_told_beside_the_run_with_the_first(monkeypatch):
+    def only_single(standing, options, *args, **more):
+        assert options.max_effects == 1, "no set beside the uncorrected stand-in"
+        return find(standing, options, *args, **more)
+
+    find = foreign.find
+    monkeypatch.setattr(foreign, "find", only_single)
+    hidden = Hidden("both", (), dry=2.0, force=lambda x, v, t: -1.5e6 * x**3)
+    able = Capabilities(run=True, parameters=True, force=True)
+    found, _ = diagnosis(
+        Simulator(able, simulate, {}, FREE, GIVEN), hidden=hidden, effects=FEW
+    )
+    named = {one.id: one.parameters[0].value for one in found.effects}
+    assert (found.verdict, found.confirmed) == ("named", "simulation")
+    assert named == pytest.approx(
+        {"coulomb_friction": 2.0, "cubic_stiffness": 1.5e6}, rel=0.02
+    )
+    for one in found.base:
+        assert one.after == pytest.approx(TRUE[one.name], rel=0.01)
+    # Intervals go with their own values.
+    for effect in found.effects:
+        (parameter,) = effect.parameters
+        assert parameter.low < parameter.value < parameter.high
+
+
+def test_values_of_a_pair_stand_in_the_order_of_its_effects():
+    fit = replace(
+        made_up(("actuator_lag",), 1.0, parameters=3),
+        names=(
+            ParameterRef("", "stiffness_N_per_m"),
+            ParameterRef("cubic_stiffness", "stiffness_N_per_m3"),
+            ParameterRef("actuator_lag", "time_constant_s"),
+        ),
+        values=np.array([1.0, 2.0, 3.0]),
+        valleys=np.array([[10.0, 20.0, 30.0]]),
+    )
+    pair = further_effects._as_pair(fit, "cubic_stiffness")
+    assert pair.effects == ("actuator_lag", "cubic_stiffness")
+    assert [one.owner for one in pair.names] == ["", *pair.effects]
+    np.testing.assert_array_equal(pair.values, [1.0, 3.0, 2.0])
+    np.testing.assert_array_equal(pair.valleys, [[10.0, 30.0, 20.0]])
+
+
+@pytest.mark.parametrize(
+    ("effect", "most"), [("coulomb_friction", 1), ("parameter_change:mass", 2)]
+)
+def test_one_effect_stays_alone_where_no_second_may_be_asked_for(
+    monkeypatch, effect, most
+):
+    monkeypatch.setattr(further_effects, "find", None)
+    chosen = made_up((effect,), 1.0, parameters=1)
+    one = SimpleNamespace(verdict=SimpleNamespace(chosen=chosen))
+    first = BySingleEffects(one, {}, is_all=False)
+    options = DiagnoseOptions(max_effects=most)
+    assert with_further_effect(first, None, options, None) is first
+    nothing = BySingleEffects(None, {}, is_all=False)
+    assert with_further_effect(nothing, None, options, None) is nothing
