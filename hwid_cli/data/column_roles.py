@@ -14,6 +14,7 @@ import numpy as np
 
 from hwid_cli.data import column_signs as signs
 from hwid_cli.data.column_words import (
+    OF_UNIT,
     Meaning,
     counts_recordings,
     meaning_of,
@@ -255,9 +256,10 @@ def _unit_of_clock(
     is_whole = bool((column.values == np.round(column.values)).all())
     if clock.step < 1.0 or not is_whole:
         return "", "", _slow_note(clock.step)
-    is_counter = column.title or clock.step == 1.0
-    if meaning_of(column.title).role != "time" and is_counter:
-        # Of samples.
+    role = meaning_of(column.title).role
+    is_named = bool(column.title) and role not in ("", "time")
+    if role != "time" and (is_named or clock.step == 1.0):
+        # Of samples, or no clock at all.
         return "", "", ()
     unit = next(unit for least, unit in reversed(_WHOLE_STEPS) if clock.step >= least)
     note = (
@@ -364,7 +366,7 @@ def _with_meanings(columns: Sequence[FoundColumn]) -> list[_Named]:
 
 def _is_worded(one: _Named) -> bool:
     """Whether a word of the name says the role, and not the unit alone."""
-    return one.meaning.rank < 99
+    return one.meaning.rank != OF_UNIT
 
 
 def _is_plug(one: _Named) -> bool:
@@ -433,8 +435,9 @@ def _chosen_input(inputs: list[_Named], last: _Named) -> tuple[_Named, str]:
 
 def _chosen_output(first: _Named, outputs: list[_Named]) -> tuple[_Named, str]:
     # Columns that share the rest of their names belong together: u2 and y2.
-    together = [one for one in outputs if one.meaning.rest == first.meaning.rest]
-    chosen = together or outputs
+    meant = [one for one in outputs if one.meaning.rank <= OF_UNIT] or outputs
+    together = [one for one in meant if one.meaning.rest == first.meaning.rest]
+    chosen = together or meant
     settled = [one for one in chosen if not signs.runs_away(one.values)]
     if settled and settled[0] is not chosen[0]:
         title = chosen[0].column.title

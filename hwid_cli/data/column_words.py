@@ -55,6 +55,7 @@ _INPUT = [
 ]
 _OUTPUT = [
     "displacement",
+    "disp",
     "position",
     "pos",
     "weg",
@@ -83,6 +84,7 @@ _OUTPUT = [
     "drehzahl",
     "omega",
     "rpm",
+    "erpm",
     "qm",
     "q",
     "level",
@@ -103,6 +105,13 @@ _OUTPUT = [
     "tacho",
     "lvdt",
 ]
+# Rank of a role that no word tells, but the unit.
+OF_UNIT = 99
+# Of several outputs these are hardly ever meant: how warm a machine is, how it shakes.
+_HARDLY_MEANT = {
+    **dict.fromkeys(("temperature", "temperatur", "temp"), 101),
+    **dict.fromkeys(("acceleration", "beschleunigung", "acc"), 100),
+}
 # Words that say that something was measured: another word, or the unit, says what.
 _MEASURED = ["measured", "measurement", "istwert", "fb", "feedback"]
 _TIME = [
@@ -247,24 +256,31 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
     )
     # The port of a block, of which the path says the name: Ref/Out1.
     is_reference |= any(word in _REFERENCE for word in _words_of_path(bare))
-    role, rank, used = "", 99, ""
-    for name, known in (
-        ("time", _TIME),
-        ("output", _OUTPUT),
-        ("input", _INPUT),
-        ("output", _MEASURED),
-        ("counter", _COUNTER),
+    role, rank, used = "", OF_UNIT, ""
+    # A whole word says more than a letter: the current of an axis q is none of its places.
+    whole = [word for word in words if len(word) > 1]
+    for name, known, some in (
+        ("time", _TIME, whole),
+        ("output", _OUTPUT, whole),
+        ("input", _INPUT, whole),
+        ("time", _TIME, words),
+        ("output", _OUTPUT, words),
+        ("input", _INPUT, words),
+        ("output", _MEASURED, words),
+        ("counter", _COUNTER, words),
     ):
-        for word in words:
+        for word in some:
             found = _rank(word, known)
             if found is not None and not role:
                 role, rank, used = name, found, word
+    if role == "output" and (last := _rank(used, list(_HARDLY_MEANT))) is not None:
+        rank = list(_HARDLY_MEANT.values())[last]
     if not unit and any(word in _STATES for word in words):
-        role, rank, used = "counter", 99, ""
+        role, rank, used = "counter", OF_UNIT, ""
     if role == "time" and used == "t" and _is_temperature(words, unit):
-        role, rank = "output", _rank("temp", _OUTPUT) or 98
+        role, rank = "output", _HARDLY_MEANT["temp"]
     elif unit and (not role or _is_contradicted(role, used, unit)):
-        role, rank, used = _role_of_unit(unit), 99, ""
+        role, rank, used = _role_of_unit(unit), OF_UNIT, ""
     is_wanted = any(word in _WANTED and word != used for word in words)
     if is_reference or is_wanted:
         # A wanted current is what drives the machine; a wanted position is no output.

@@ -360,6 +360,8 @@ _MEASURED_IN = {
 
 
 # A column of time may be named by its unit alone.
+# What ticks, in front of what it counts from.
+_TICKS_IN_FRONT = re.compile(r"(ms|us|ns)(?=[_ ])", re.IGNORECASE)
 _NAMES_OF_TIME = {
     **{unit: unit for unit in ("ms", "us", "µs", "ns", "sec", "msec")},
     "millis": "ms",
@@ -419,10 +421,14 @@ def unit_in_name(title: str, role: str) -> str:
     ('', 'inc')
     >>> unit_in_name("theta_m", "output"), unit_in_name("current_A", "output")
     ('', 'A')
+    >>> unit_in_name("ms_today", "time"), unit_in_name("ms_today", "output")
+    ('ms', '')
     """
     bare, unit = split_unit(title)
     if role == "time" and title.strip() in _NAMES_OF_TIME:
         return _NAMES_OF_TIME[title.strip()]
+    if role == "time" and (first := _TICKS_IN_FRONT.match(title.strip())):
+        return first[1].lower()
     if not unit:
         return ""
     bracket = _BRACKET.search(title)

@@ -256,3 +256,39 @@ def test_columns_of_one_recording_that_are_numbered_are_no_pairs():
         ("u1", voltage, ""), ("y1", position, ""), ("current2", current, "")
     )
     assert not [one for one in guess.notes if one.startswith("NOT USED")]
+
+
+@pytest.mark.parametrize("warm", ["T [°C]", "Temp [°C]", "Motortemperatur", "T [K]"])
+@pytest.mark.parametrize("moves", ["n [1/min]", "v [m/s]", "Drehzahl"])
+def test_a_speed_is_meant_rather_than_a_temperature(warm, moves):
+    rng = np.random.default_rng(1)
+    warmth = 40 + 0.1 * rng.standard_normal(N)
+    found = guessed(("U_A [V]", VOLTAGE), (warm, warmth), (moves, SPEED))
+    assert found[:2] == ("U_A [V]", moves)
+
+
+def test_a_place_is_meant_rather_than_how_it_shakes():
+    found = guessed(("F (N)", VOLTAGE), ("acc (g)", CURRENT), ("gap (mm)", POSITION))
+    assert found[:2] == ("F (N)", "gap (mm)")
+
+
+def test_a_temperature_alone_is_the_output():
+    assert guessed(("heater [V]", VOLTAGE), ("T [°C]", SPEED))[:2] == (
+        "heater [V]",
+        "T [°C]",
+    )
+
+
+@pytest.mark.parametrize(
+    ("title", "unit", "is_sure"),
+    [("ms_today", "ms", True), ("tick", "ms", False), ("us since start", "us", True)],
+)
+def test_whole_numbers_that_grow_evenly_are_no_seconds(title, unit, is_sure):
+    found = guess_time([column(title, 40_000.0 + 20 * np.arange(N))])
+    assert (found.role.title, found.role.unit) == (title, unit)
+    assert any("NOT SURE" in note for note in found.notes) != is_sure
+
+
+@pytest.mark.parametrize("title", ["sample", "position"])
+def test_what_is_named_otherwise_is_no_clock(title):
+    assert guess_time([column(title, 20.0 * np.arange(N))]).role is None

@@ -79,3 +79,18 @@ def test_what_was_measured_is_said_by_another_word_or_it_is_the_output():
 )
 def test_a_capital_t_may_be_a_temperature(title, role):
     assert meaning_of(title).role == role
+
+
+@pytest.mark.parametrize(
+    ("title", "role"),
+    [
+        ("q_axis_current", "input"),
+        ("x_force", "input"),
+        ("t_position", "output"),
+        ("q_motor", "output"),
+        ("u_measured", "input"),
+        ("i_q", "input"),
+    ],
+)
+def test_a_whole_word_says_more_than_a_letter(title, role):
+    assert meaning_of(title).role == role

@@ -308,3 +308,26 @@ def test_few_cells_are_read_one_by_one_where_columns_end_early(tmp_path, monkeyp
     assert found.input.values.size == 5000
     # Of 5003 rows at most twice those in which a block is not halved any more.
     assert 3 <= sum(seen) <= 2 * csv_files._PLAIN_LINES + 3
+
+
+def rows_of_four(count=200):
+    return [f"{0.5 * n:g},{n},{100 + n},{3 * n}" for n in range(count)]
+
+
+def test_a_row_that_was_still_being_written_is_no_sample(read):
+    rows = rows_of_four()
+    rows[-1] = "99.5,199,2"
+    t, _, y = read("\n".join(["t,u,y,T", *rows]))
+    assert (t[-1], y[-1], y.size) == (99.0, 298.0, 199)
+    # With a line end the column at the right has ended.
+    t, _, y = read("\n".join(["t,u,y,T", *rows]) + "\n")
+    assert (y[-1], y.size) == (2.0, 200)
+
+
+def test_a_row_that_is_torn_in_the_last_column_wanted_has_no_number_there(read):
+    rows = rows_of_four()
+    rows[120] = "60,120,2"
+    _, u, y = read("\n".join(["t,u,y,T", *rows]) + "\n")
+    assert np.isnan(y[120])
+    assert u[120] == 120
+    assert np.isfinite(np.delete(y, 120)).all()
