@@ -301,11 +301,33 @@ def _sorted_out(
             for name, found in begins.items()
             if found
         }
+    why |= _copies([one for one in used if not why[one.name]], roles)
     used = [one for one in used if not why[one.name]]
     left = tuple((name, reason) for name, reason in why.items() if reason)
     if not used:
         raise MeasurementError(f"{escaped(left[0][0])}: {left[0][1]}")
     return used, left
+
+
+def _copies(
+    files: Sequence[FoundFile], roles: Mapping[str, FoundColumn]
+) -> dict[str, str]:
+    """Files with the same numbers as another one, which has the shorter name.
+
+    A model that was fitted to one of them would be tested on the other.
+    """
+    places = {roles[role].place for role in ("input", "output")}
+    first: dict[tuple[bytes, ...], str] = {}
+    found = {}
+    for file in sorted(files, key=lambda one: (len(one.name), one.name)):
+        signals = [one for one in file.columns if one.place in places]
+        if not all(signs.changes(one.values) for one in signals):
+            continue
+        numbers = tuple(one.values.tobytes() for one in signals)
+        known = first.setdefault(numbers, file.name)
+        if known != file.name:
+            found[file.name] = f"holds the same numbers as {escaped(known)}"
+    return found
 
 
 def _begins(file: FoundFile, time: FoundColumn | None) -> tuple[int, ...]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from hwid_cli.data.array_columns import (
     TITLE_MARK,
+    UNIT_MARK,
     Variables,
     check_size,
     member_of,
@@ -22,6 +23,15 @@ from hwid_cli.data.octave_files import is_octave_text, octave_variables
 _MOST_ELEMENTS = 1000
 # Simulink and ControlDesk name each signal of a structure beside its numbers.
 _LABELS = (("values", "label"), ("Data", "Name"))
+# An iddata that was saved as a structure says its units and names beside its numbers.
+_IDDATA = (
+    ("Ts", "TimeUnit", UNIT_MARK),
+    ("SamplingInstants", "TimeUnit", UNIT_MARK),
+    ("InputData", "InputUnit", UNIT_MARK),
+    ("OutputData", "OutputUnit", UNIT_MARK),
+    ("InputData", "InputName", TITLE_MARK),
+    ("OutputData", "OutputName", TITLE_MARK),
+)
 # What scipy calls every object.
 _UNNAMED = "None"
 
@@ -100,4 +110,8 @@ def _with_members(name: str, value: Any) -> dict[str, Any]:
                 label = found.get(key.removesuffix(numbers) + words)
                 if label is not None and text_of(label):
                     found[key + TITLE_MARK] = label
+    for numbers, words, mark in _IDDATA:
+        label = found.get(f"{name}.{words}")
+        if f"{name}.{numbers}" in found and label is not None and text_of(label):
+            found[f"{name}.{numbers}{mark}"] = label
     return found

@@ -1,6 +1,6 @@
 """Channels of a TDMS file of LabVIEW, by the library npTDMS."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -11,7 +11,10 @@ import numpy as np
 from hwid_cli.data.array_columns import Variables
 from hwid_cli.data.signal_groups import GroupedSignal, as_variables
 
-_STEP, _BEGIN = "wf_increment", "wf_start_offset"
+_STEP, _BEGIN, _STARTED = "wf_increment", "wf_start_offset", "wf_start_time"
+# Channels that begin further apart are no recording of one machine: such a date is a
+# program's default, [s].
+_LONGEST_WAIT_S = 3600.0
 _UNITS = ("unit_string", "NI_UnitDescription", "unit", "Unit", "units")
 
 
@@ -28,17 +31,34 @@ def open_tdms(path: Path) -> Iterator[Variables]:
 
     with TdmsFile.open(str(path)) as file:
         channels = [
-            _signal(group.name, channel)
+            (group.name, channel)
             for group in file.groups()
             for channel in group.channels()
             if len(channel) and channel.dtype.kind in "fiubM"
         ]
-        yield as_variables(channels)
+        waits = _waits([channel for _, channel in channels])
+        pairs = zip(channels, waits, strict=True)
+        yield as_variables(_signal(*one, wait) for one, wait in pairs)
 
 
-def _signal(group: str, channel: Any) -> GroupedSignal:
+def _waits(channels: Sequence[Any]) -> list[float]:
+    """By how much channels begin after the first of them, [s]; 0 where some do not say."""
+    nothing = [0.0] * len(channels)
+    dates = [
+        np.datetime64(channel.properties[_STARTED])
+        for channel in channels
+        if _STARTED in channel.properties
+    ]
+    if len(dates) < len(channels) or not dates:
+        return nothing
+    waits = [(one - min(dates)) / np.timedelta64(1, "s") for one in dates]
+    return [float(one) for one in waits] if max(waits) < _LONGEST_WAIT_S else nothing
+
+
+def _signal(group: str, channel: Any, wait: float) -> GroupedSignal:
     said = channel.properties
     step, begin = (float(said.get(name, 0.0) or 0.0) for name in (_STEP, _BEGIN))
+    begin += wait
     size = len(channel)
     has_clock = step > 0 and channel.dtype.kind != "M"
     unit = next((str(said[name]) for name in _UNITS if said.get(name)), "")

@@ -441,6 +441,7 @@ def test_every_file_is_named_with_what_became_of_it(folder, tmp_path):
 def test_files_in_other_units_are_not_read_in_the_first_ones(folder, tmp_path):
     for name, unit, scale in (("a", "A", 1), ("b", "A", 1), ("c", "mA", 1000)):
         time, u, y = measurements()["Rauschen_1"]
+        y = y + 1e-3 * (name == "b")
         rows = [f"{t:.4f},{scale * a},{b}" for t, a, b in zip(time, u, y, strict=True)]
         head = ["t,current,pos", f"s,{unit},mm"]
         (folder / f"{name}.csv").write_text("\n".join([*head, *rows]))
@@ -563,3 +564,17 @@ def test_a_reference_in_millimetres_is_converted_as_its_position_is(folder, tmp_
     assert (options.units.input, options.units.output) == ("mm", "mm")
     raws = read_recordings(load_experiment(out), out)
     assert max(np.max(one.input) for one in raws) == pytest.approx(0.02)
+
+
+def test_a_copy_of_a_recording_is_named_and_left_out(folder, tmp_path):
+    """A model that was fitted to one of them would be tested on the other."""
+    write_english_csv(folder)
+    first = sorted(folder.glob("*.csv"))[0]
+    copy = folder / f"{first.stem} - Copy.csv"
+    copy.write_bytes(first.read_bytes())
+    result = invoke("init", folder, "--out", tmp_path / "mine.yaml")
+
+    assert result.exit_code == 0, result.output
+    assert f"{copy.name}: holds the same numbers as {first.name}" in result.stdout
+    raws = read_recordings(load_experiment(tmp_path / "mine.yaml"), tmp_path)
+    assert copy.stem not in {one.name for one in raws}
