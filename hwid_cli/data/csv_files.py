@@ -319,6 +319,10 @@ def _rows(
         width = len(rows[-1])
         for number, end in enumerate(ends):
             line = lines[end - 1].strip().lstrip(_COMMENT).strip()
+            if len(rows[number]) == width + 1 and rows[number][0].endswith(":"):
+                # A word in front says that names follow.
+                rows[number] = rows[number][1:]
+                continue
             # Names with single blanks inside stand further apart; units in brackets
             # belong to the name in front.
             for blanks in (r"\s{2,}", r"\s+(?![\[(])"):

@@ -1,7 +1,7 @@
 """Variables of a MAT file of any version."""
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -110,8 +110,14 @@ def _with_members(name: str, value: Any) -> dict[str, Any]:
                 label = found.get(key.removesuffix(numbers) + words)
                 if label is not None and text_of(label):
                     found[key + TITLE_MARK] = label
+    return {**found, **_said_of_iddata(name, found)}
+
+
+def _said_of_iddata(name: str, found: Mapping[str, Any]) -> dict[str, Any]:
+    """Units and names of the numbers of a structure."""
+    said = {}
     for numbers, words, mark in _IDDATA:
         label = found.get(f"{name}.{words}")
         if f"{name}.{numbers}" in found and label is not None and text_of(label):
-            found[f"{name}.{numbers}{mark}"] = label
-    return found
+            said[f"{name}.{numbers}{mark}"] = label
+    return said

@@ -77,9 +77,9 @@ def list_sheet_columns(path: Path) -> Iterator[FoundColumn]:
     found = {}
     for name in _names(path):
         rows = _rows(path, name)
-        head = read_head(_as_texts(rows[:_HEAD_ROWS]))
-        if not rows or head.body == min(len(rows), _HEAD_ROWS):
+        if not _holds_numbers(rows):
             continue
+        head = read_head(_as_texts(rows[:_HEAD_ROWS]))
         places = [one for one in range(max(map(len, rows))) if one not in head.texts]
         titles = {place: f"column {place}" for place in places}
         found[name] = (_read_body(path, rows, head, titles), head)
@@ -128,9 +128,10 @@ def _sheet_of(path: Path, name: str | None) -> tuple[str, list[list[Any]]]:
 
 
 def _holds_numbers(rows: Sequence[Sequence[Any]]) -> bool:
-    """Whether rows of numbers follow; programs write them as text too ("0,5")."""
-    if any(isinstance(cell, float) for row in rows for cell in row):
-        return True
+    """Whether rows of numbers follow, and not a date and a setting on a cover alone.
+
+    Programs write them as text too ("0,5").
+    """
     texts = _as_texts(rows[:_HEAD_ROWS])
     return bool(texts) and read_head(texts).body < len(texts)
 

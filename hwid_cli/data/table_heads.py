@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from functools import cache, lru_cache
 
 from hwid_cli.data.cells import MISSING_WORDS, is_grouped, is_stamp, plain_number
+from hwid_cli.data.column_words import counts_recordings
 from hwid_cli.data.units import bare_unit, factor_between, looks_like_unit, split_unit
 
 # Words in front of a row of names, of units; letters only, in lower case.
@@ -360,7 +361,7 @@ def _name_row(
         is_about = bool(row[0]) and (0 not in numeric or row.count(row[0]) > 1)
         # A word for time in front of each pair is the name of its clock.
         is_about &= 0 not in numeric or key not in _TIME_WORDS
-        is_about |= key in _OTHER_WORDS | _SCALE_WORDS
+        is_about |= key in _OTHER_WORDS | _SCALE_WORDS or _is_title(row)
         states_clock = key in _INTERVAL_WORDS | _RATE_WORDS
         is_about |= states_clock and all(map(is_quantity, filter(None, row[1:])))
         if key in _UNIT_WORDS:
@@ -375,6 +376,13 @@ def _name_row(
         fallback = number if fallback < 0 else fallback
     # A lone row of units is one of names too, unless others stand elsewhere.
     return -1 if is_named and units else fallback, units
+
+
+def _is_title(row: Sequence[str]) -> bool:
+    """Whether a row says which recording follows: run 2: step."""
+    cells = [cell for cell in row if cell]
+    is_numbered = len(cells) > 1 and cells[1].lstrip("#")[:1].isdigit()
+    return is_numbered and counts_recordings(cells[0])
 
 
 def _stated_units(

@@ -55,3 +55,41 @@ def test_an_iddata_saved_as_a_structure_says_its_units(tmp_path, unit, step_s):
     assert guess_time(columns).sample_time_s == pytest.approx(step_s)
     units = {one.title: one.unit for one in columns if one.values.size == N}
     assert units == {"valve": "V", "stroke": "mm"}
+
+
+def test_a_cover_of_a_workbook_is_no_table(tmp_path):
+    """It holds a date and a setting, which are numbers, too."""
+    import datetime as dt
+
+    import openpyxl
+
+    from hwid_cli.data.formats import read_columns
+    from hwid_cli.records.experiment import Columns
+
+    book = openpyxl.Workbook()
+    cover = book.active
+    for row in (("bench 7",), ("date", dt.datetime(2024, 3, 11)), ("step", 20, "ms")):
+        cover.append(row)
+    data = book.create_sheet("data")
+    data.append(("t [s]", "u [V]", "y [mm]"))
+    for n in range(N):
+        data.append((0.02 * n, n % 7, n % 5))
+    path = tmp_path / "run.xlsx"
+    book.save(path)
+    assert {one.variable for one in list_columns(path)} == {None}
+    found = read_columns(path, Columns(time="t [s]", input="u [V]", output="y [mm]"))
+    assert found.output.values.size == N
+
+
+def test_titles_of_blocks_are_no_names(tmp_path):
+    """As gnuplot takes them: names once, then recordings between blank lines."""
+    lines = ["# slide rig", "# columns: time(s) volt(V) pos(cm)"]
+    for run in range(2):
+        lines += [f"# run {run + 1}: step"]
+        lines += [f"{0.01 * n:g} {n % 7} {n % 5}" for n in range(N)]
+        lines += ["", ""]
+    path = tmp_path / "all.dat"
+    path.write_text("\n".join(lines))
+    found = {one.title: one.values for one in list_columns(path)}
+    assert list(found) == ["time(s)", "volt(V)", "pos(cm)"]
+    assert found["pos(cm)"].size == 2 * N
