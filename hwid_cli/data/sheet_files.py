@@ -28,6 +28,8 @@ from hwid_cli.records.starter import FoundColumn
 
 # Rows from which the form of a sheet is told.
 _HEAD_ROWS = 1000
+# A sheet with fewer rows of numbers is no measurement.
+_FEWEST_ROWS = 10
 # Cells of the largest sheet: a spreadsheet has a million rows, a measurement few columns.
 _MOST_CELLS = 30_000_000
 
@@ -75,10 +77,7 @@ def read_sheet_columns(
 def list_sheet_columns(path: Path) -> Iterator[FoundColumn]:
     """List the columns of numbers of every sheet; of one sheet alone without its name."""
     found = {}
-    for name in _names(path):
-        rows = _rows(path, name)
-        if not _holds_numbers(rows):
-            continue
+    for name, rows in _tables(path).items():
         head = read_head(_as_texts(rows[:_HEAD_ROWS]))
         places = [one for one in range(max(map(len, rows))) if one not in head.texts]
         titles = {place: f"column {place}" for place in places}
@@ -117,23 +116,32 @@ def _sheet_of(path: Path, name: str | None) -> tuple[str, list[list[Any]]]:
             f"{path}: has no sheet {name!r} for recordings.columns.variable; "
             f"{did_you_mean(name, names)}"
         )
-    for one in names if name is None else [name]:
-        rows = _rows(path, one)
-        if name is not None or _holds_numbers(rows):
-            return one, rows
+    if name is not None:
+        return name, _rows(path, name)
+    tables = _tables(path)
+    if tables:
+        return next(iter(tables.items()))
     raise MeasurementError(
         f"{path}: holds no sheet with numbers; expected one; export the measurement "
         "again or leave the file out"
     )
 
 
-def _holds_numbers(rows: Sequence[Sequence[Any]]) -> bool:
-    """Whether rows of numbers follow, and not a date and a setting on a cover alone.
+def _tables(path: Path) -> dict[str, list[list[Any]]]:
+    """Rows of the sheets that hold numbers.
 
-    Programs write them as text too ("0,5").
+    A cover holds a date and a setting: beside a longer table it is none.
     """
+    sheets = {name: _rows(path, name) for name in _names(path)}
+    counts = {name: _rows_of_numbers(rows) for name, rows in sheets.items()}
+    least = min(_FEWEST_ROWS, max(counts.values(), default=1)) or 1
+    return {name: rows for name, rows in sheets.items() if counts[name] >= least}
+
+
+def _rows_of_numbers(rows: Sequence[Sequence[Any]]) -> int:
+    """Rows that follow a head; programs write numbers as text too ("0,5")."""
     texts = _as_texts(rows[:_HEAD_ROWS])
-    return bool(texts) and read_head(texts).body < len(texts)
+    return len(texts) - read_head(texts).body if texts else 0
 
 
 def _names(path: Path) -> list[str]:
