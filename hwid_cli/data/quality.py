@@ -18,6 +18,9 @@ _LIMIT_RUN = 5
 # at least, leaves a limit so often, and bends by more than this share of its range from
 # sample to sample, [-].
 _INSIDE_SHARE, _LEAST_VISITS, _STRAIGHT = 0.1, 3, 1e-6
+# A signal that begins again from the other end of its range jumps over more than this
+# share of it, in at most this share of its steps, and moves for so many samples beside it.
+_WHOLE_RANGE, _MOST_WRAPS, _BESIDE_JUMP = 0.7, 0.1, 3
 # Share of a recording that a stretch without change must take to be named, [-].
 _DEAD_SHARE = 0.05
 # Standard deviations from zero beyond which a fit without maps that shift ends in poor
@@ -64,11 +67,38 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
             f"{middle / spread:.3g} standard deviations from zero: take the offset off, "
             "fits with few kinds of maps may miss it"
         )
+    wraps = _count_wraps(values)
+    if wraps and not may_hold:
+        times = "once" if wraps == 1 else f"{wraps} times"
+        notes.append(
+            f"jumps over its whole range {times}: it begins again from there, as an angle "
+            "after a turn; put the turns together (numpy.unwrap) before you use it"
+        )
     damaged = find_damaged(values, may_hold=may_hold).size
     if damaged:
         what = "sample looks" if damaged == 1 else "samples look"
         notes.append(f"{damaged} {what} damaged")
     return tuple(notes)
+
+
+def _count_wraps(values: np.ndarray) -> int:
+    """How often a signal goes on from the other end of its range; 0 if it also jumps there.
+
+    It moves one way before and behind such a jump, which goes the other way. A level that
+    changes stands still before and after it, up to its noise.
+    """
+    steps = np.diff(values)
+    span = float(np.ptp(values))
+    jumps = np.flatnonzero(np.abs(steps) > _WHOLE_RANGE * span)
+    if jumps.size == 0 or jumps.size > _MOST_WRAPS * steps.size:
+        return 0
+    usual = float(np.median(np.abs(steps)))
+    before = values[jumps] - values[np.maximum(jumps - _BESIDE_JUMP, 0)]
+    behind = np.minimum(jumps + 1 + _BESIDE_JUMP, values.size - 1)
+    after = values[behind] - values[jumps + 1]
+    way = -np.sign(steps[jumps])
+    goes_on = np.minimum(way * before, way * after) > 2.0 * usual
+    return int(jumps.size) if usual > 0 and goes_on.all() else 0
 
 
 def _comes_back_from_limits(values: np.ndarray, inside: np.ndarray) -> bool:

@@ -84,3 +84,22 @@ def test_flicker_of_the_last_bit_is_no_damage_and_a_spike_is():
     assert quality_notes(0.04 * flicker, may_hold=True) == ()
     flicker[450] += 5.0
     assert quality_notes(0.04 * flicker, may_hold=True) == ("1 sample looks damaged",)
+
+
+@pytest.mark.parametrize("turns", [1.6, 4.2, -3.3])
+def test_an_angle_that_begins_again_after_a_turn_is_named(turns):
+    rng = np.random.default_rng(2)
+    angle = 360 * turns * np.linspace(0, 1, 900) + 0.02 * rng.standard_normal(900)
+    (note,) = quality_notes(np.mod(angle + 20, 360))
+    times = int(abs(turns) + (0.06 if turns > 0 else 0.94))
+    said = "once" if times == 1 else f"{times} times"
+    assert f"jumps over its whole range {said}:" in note
+    assert quality_notes(angle) == ()
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_levels_that_change_do_not_begin_again(noise):
+    rng = np.random.default_rng(3)
+    levels = np.repeat([0.0, 1.0, 0.0, 1.0, 0.0], 180)
+    found = quality_notes(levels + noise * rng.standard_normal(900))
+    assert not any("begins again" in note for note in found)
