@@ -44,6 +44,8 @@ from hwid_cli.records.recordings import Recording
 # Searches, each from where the last one has moved the parameters by more than this.
 _MOST_SEARCHES = 3
 _MOVED = 0.01
+# Verdicts that a law may take the place of.
+_NAMED = ("named", "ambiguous")
 # Factors of the stand-in that are none: as far as parameters are told, at most and at
 # least by these shares, [-].
 _SLIGHT, _LARGEST_SLIGHT = 1e-4, 0.01
@@ -258,7 +260,7 @@ def _law_instead(
         Parameters of the simulation that no effect has moved.
     """
     is_open = options.laws == "auto" and options.effects is None
-    if not is_open or verdict.word != "named" or verdict.is_complete:
+    if not is_open or verdict.word not in _NAMED or verdict.is_complete:
         return None
     on_round("a law instead", 0)
     standing = standing_beside(runs, problem, runs.of(problem.signals, values), values)

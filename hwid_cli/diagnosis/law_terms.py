@@ -15,6 +15,8 @@ from hwid_cli.drive.formula import evaluate, names, parsed
 # Shares of the largest displacement and velocity at which a law may set in.
 _PLACES = (0.3, 0.5, 0.7)
 _SPEEDS = (0.3, 0.6)
+# The same from where on a force levels off.
+_BENDS = (0.15, 0.4)
 _MOST_WAVES = 2
 # Exponents that a power is tried with before it is refined.
 _POWERS = (0.5, 1.5, 2.0, 3.0, 5.0)
@@ -186,6 +188,11 @@ def _thresholds(scales: Scales) -> Iterator[Term]:
         yield Term("Max(abs(v) - a, 0)*sign(v)", (1, -1, 0), a, "beyond a speed")
         a = {"a": (share * scales.current_A, "")}
         yield Term("Max(abs(u) - a, 0)*sign(u)", (0, 0, 1), a, "beyond an input")
+    for share in _BENDS:
+        a = {"a": (share * scales.displacement_m, "m")}
+        yield Term("tanh(x/a)", (0, 0, 0), a, "levels off in x")
+        a = {"a": (share * scales.velocity_m_per_s, "m/s")}
+        yield Term("tanh(v/a)", (0, 0, 0), a, "levels off in v")
     yield Term("Heaviside(x)*sign(v)", (0, 0, 0))
     yield Term("Heaviside(v)*v**2", (2, -2, 0))
 
