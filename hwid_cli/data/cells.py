@@ -32,7 +32,7 @@ _GROUPED = {
     ".": re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+(?:,\d*)?"),
 }
 _TIME_OF_DAY = (
-    r"(?:(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2})(?:[.,:](?P<f>\d{1,12}))?"
+    r"(?:(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2})(?:[.,:;](?P<f>\d{1,12}))?"
     # Minutes and seconds, if a fraction shows what they are.
     r"|(?P<m2>\d{1,2}):(?P<s2>\d{2})[.,](?P<f2>\d{1,12}))"
 )
@@ -46,7 +46,7 @@ _STAMP = re.compile(
     r"|(?P<a>\d{1,2})(?P<mark>[./-])(?P<b>\d{1,2})[./-](?P<y2>\d{4})"
     # Two digits of a year stand behind points: others have several orders.
     r"|(?P<d3>\d{1,2})\.(?P<mo3>\d{1,2})\.(?P<y3>\d{2})"
-    rf"|(?P<d4>\d{{1,2}})[-. ]+(?P<month>(?i:{'|'.join(_MONTH)}))[a-zä]*[-. ]+(?P<y4>\d{{4}})"
+    rf"|(?P<d4>\d{{1,2}})[-. ]+(?P<month>(?i:{'|'.join(_MONTH)}))[a-zä]*[-. ]+(?P<y4>\d{{4}}|\d{{2}})"
     r")[T ]\s*)?"
     + _TIME_OF_DAY
     + r"\s*(?P<half>[AaPp][Mm])?(?P<zone>Z|[+-]\d{2}:?\d{2})?"
@@ -55,6 +55,14 @@ _STAMP = re.compile(
 _DURATION = re.compile(
     r"([-+]?\d+(?:[.,]\d*)?(?:[eE][-+]?\d+)?) ?(us|µs|ms|s|sec|min|hr)"
 )
+# A time of IEC 61131-3: T#1s200ms.
+_IEC = re.compile(
+    r"(?:T|TIME|LT|LTIME)#((?:\d+(?:\.\d+)?(?:ms|us|ns|d|h|m|s)_?)+)", re.I
+)
+_IEC_PART = re.compile(r"(\d+(?:\.\d+)?)(ms|us|ns|d|h|m|s)", re.I)
+_IEC_SECONDS = {
+    "d": 86_400.0, "h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9,
+}  # fmt: skip
 _IN_UNIT = {"us": 1e6, "µs": 1e6, "ms": 1e3, "s": 1.0, "sec": 1.0}
 _SECONDS = {"min": 60.0, "hr": 3600.0}
 
@@ -236,10 +244,12 @@ def is_stamp(cell: str) -> bool:
     (True, True, False)
     >>> is_stamp("01-May-2024 12:00:00.125"), is_stamp("1.25 sec"), is_stamp("1.25 mm")
     (True, True, False)
+    >>> is_stamp("11-Mar-24 08:00:00"), is_stamp("T#1s200ms"), is_stamp("10:10:59;120")
+    (True, True, True)
     """
     if ":" in cell:
         return _STAMP.fullmatch(cell) is not None
-    return _DURATION.fullmatch(cell) is not None
+    return any(form.fullmatch(cell) is not None for form in (_DURATION, _IEC))
 
 
 def stamps_in_seconds(cells: Iterable[str]) -> tuple[np.ndarray, dict[int, str]]:
@@ -267,6 +277,9 @@ def stamps_in_seconds(cells: Iterable[str]) -> tuple[np.ndarray, dict[int, str]]
 
 
 def _duration(cell: str) -> float:
+    if iec := _IEC.fullmatch(cell):
+        parts = _IEC_PART.findall(iec[1])
+        return sum(float(value) * _IEC_SECONDS[unit.lower()] for value, unit in parts)
     match = _DURATION.fullmatch(cell)
     if match is None:
         return np.nan
@@ -303,7 +316,8 @@ def _day(part: dict[str, str | None]) -> int:
         fields = [2000 + int(part["y3"]), int(part["mo3"] or 0), int(part["d3"] or 0)]
     elif part["y4"]:
         month = _MONTH[(part["month"] or "").lower()]
-        fields = [int(part["y4"]), month, int(part["d4"] or 0)]
+        year = int(part["y4"])
+        fields = [year if year > 99 else 2000 + year, month, int(part["d4"] or 0)]
     else:
         return 0
     try:

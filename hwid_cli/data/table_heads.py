@@ -7,7 +7,7 @@ their words.
 """
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
 
@@ -300,17 +300,19 @@ def _first_row(
     def is_other(number: int) -> bool:
         return any(rows[number]) and not is_of_table(number)
 
-    # A row of a preamble may look like one of the table; those below it do not.
-    first = next(
-        (
-            number
-            for place, number in enumerate(plain)
-            if is_of_table(number)
-            and sum(map(is_other, plain[place + 1 : place + 1 + _ROWS_BELOW]))
-            <= _MOST_DAMAGED
-        ),
-        len(rows),
-    )
+    def is_filled(number: int) -> bool:
+        filled = [cell for cell in _cells(rows[number], numeric) if cell]
+        return 2 * len(filled) >= len(numeric)
+
+    # A row of a preamble may look like one of the table; those below it do not, or it has
+    # few of its cells, as the date at which a trend begins.
+    def possible() -> Iterator[int]:
+        for place, number in enumerate(plain):
+            below = plain[place + 1 : place + 1 + _ROWS_BELOW]
+            if is_of_table(number) and sum(map(is_other, below)) <= _MOST_DAMAGED:
+                yield number
+
+    first = next(filter(is_filled, possible()), next(possible(), len(rows)))
     if not numeric or first == len(rows):
         return len(rows)
     # A damaged row at the beginning is no preamble: words alone stand above it, or

@@ -4,6 +4,7 @@ import pytest
 from hwid_cli.data.cells import (
     TwoWaysError,
     Writing,
+    is_stamp,
     number_in,
     stamp_reader,
     stamps_in_seconds,
@@ -95,3 +96,20 @@ def test_what_is_no_stamp_is_told_by_number():
     assert others == {1: "", 2: "soon"}
     assert np.isnan(values[1:]).all()
     assert read(["nie"])[1] == {0: "nie"}
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        ("11-Mar-24 08:00:00", "11-Mar-24 08:00:01.2"),
+        ("T#8h", "T#8h1s200ms"),
+        ("TIME#480m", "TIME#480m_1s_200ms"),
+        ("5/6/2024 08:00:00;000", "5/6/2024 08:00:01;200"),
+        ("08:00:00;000", "08:00:01;200"),
+    ],
+)
+def test_stamps_of_controllers_are_seconds(cells):
+    values, others = stamps_in_seconds(cells)
+    np.testing.assert_allclose(values, [28800.0, 28801.2], atol=1e-9)
+    assert not others
+    assert all(map(is_stamp, cells))
