@@ -300,10 +300,6 @@ def _first_row(
     def is_other(number: int) -> bool:
         return any(rows[number]) and not is_of_table(number)
 
-    def is_filled(number: int) -> bool:
-        filled = [cell for cell in _cells(rows[number], numeric) if cell]
-        return 2 * len(filled) >= len(numeric)
-
     # A row of a preamble may look like one of the table; those below it do not, or it has
     # few of its cells, as the date at which a trend begins.
     def possible() -> Iterator[int]:
@@ -312,7 +308,8 @@ def _first_row(
             if is_of_table(number) and sum(map(is_other, below)) <= _MOST_DAMAGED:
                 yield number
 
-    first = next(filter(is_filled, possible()), next(possible(), len(rows)))
+    filled = (number for number in possible() if _is_filled(rows[number], numeric))
+    first = next(filled, next(possible(), len(rows)))
     if not numeric or first == len(rows):
         return len(rows)
     # A damaged row at the beginning is no preamble: words alone stand above it, or
@@ -326,6 +323,11 @@ def _first_row(
             return first
         begin = number
     return begin
+
+
+def _is_filled(row: Sequence[str], numeric: Sequence[int]) -> bool:
+    """Whether a row has at least half of its numbers."""
+    return 2 * sum(map(bool, _cells(row, numeric))) >= len(numeric)
 
 
 def _is_of_table(row: Sequence[str], numeric: Sequence[int]) -> bool:
