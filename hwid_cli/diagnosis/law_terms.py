@@ -15,7 +15,7 @@ from hwid_cli.drive.formula import evaluate, names, parsed
 # Shares of the largest displacement and velocity at which a law may set in.
 _PLACES = (0.3, 0.5, 0.7)
 _SPEEDS = (0.3, 0.6)
-# The same from where on a force levels off.
+# The same at which a force levels off.
 _BENDS = (0.15, 0.4)
 _MOST_WAVES = 2
 # Exponents that a power is tried with before it is refined.
@@ -190,9 +190,7 @@ def _thresholds(scales: Scales) -> Iterator[Term]:
         yield Term("Max(abs(u) - a, 0)*sign(u)", (0, 0, 1), a, "beyond an input")
     for share in _BENDS:
         a = {"a": (share * scales.displacement_m, "m")}
-        yield Term("tanh(x/a)", (0, 0, 0), a, "levels off in x")
-        a = {"a": (share * scales.velocity_m_per_s, "m/s")}
-        yield Term("tanh(v/a)", (0, 0, 0), a, "levels off in v")
+        yield Term("tanh(x/a)", (0, 0, 0), a, "levels off")
     yield Term("Heaviside(x)*sign(v)", (0, 0, 0))
     yield Term("Heaviside(v)*v**2", (2, -2, 0))
 

@@ -129,3 +129,16 @@ def test_a_row_of_units_holds_whatever_a_preamble_says():
 
 def test_a_setting_of_a_channel_is_no_name():
     assert head(["CH1: 20"], ["Time", "CH1", "CH2"]).said == {}
+
+
+def test_dates_of_a_preamble_are_no_rows_of_the_table():
+    """As a trend of a controller says when it began and ended."""
+    rows = [
+        ["Start Time:", "5/6/2024", "10:10:59;120"],
+        ["Stop Time:", "5/6/2024", "10:11:11;120"],
+        ["Header:", "Date", "Time", "Position", "Torque"],
+        *(["Data", "5/6/2024", f"10:10:59;{120 + n}", f"{n}", "2"] for n in range(20)),
+    ]
+    head = read_head(rows)
+    assert head.body == 3
+    assert head.names[2:] == ("Time", "Position", "Torque")

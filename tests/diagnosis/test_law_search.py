@@ -165,3 +165,10 @@ def test_a_law_is_found_in_the_speed_of_a_free_axis():
     assert found_terms(found, 1) == {"v*abs(v)"}
     of_terms, _ = coefficients(found, best_subsets(found)[0][0].places)
     assert of_terms[0] == pytest.approx(-3.0, rel=0.02)
+
+
+@pytest.mark.thorough
+def test_a_force_that_levels_off_is_one_term():
+    pair = motions(lambda x, v, u, t: -3.0 * np.tanh(x / 0.002), noise=1e-6)
+    found = regression(*pair, DRIVE, TERMS, through=True)
+    assert found_terms(found, 1) == {"tanh(x/a)"}

@@ -412,3 +412,29 @@ def test_noise_of_an_input_in_steps_is_read():
     found = noise_floor(problem_of([np.sin(one) for one in levels], read))
     # The smallest of the steps are below the limit of jumps, and make it more.
     assert 0.02 <= found.input_rms <= 1.2 * 0.02
+
+
+@pytest.mark.parametrize("is_common", [True, False])
+def test_a_motion_that_all_rests_begin_with_is_no_noise(is_common):
+    """A brake lets go at the first sample, and the load settles before anything moves."""
+    rng = np.random.default_rng(9)
+    of = problem(recordings({}, noise=0.0))
+    time = np.arange(60)
+    signals = []
+    for one in of.signals:
+        n = one.driven_by.size + time.size
+        size = 1.0 if is_common else rng.uniform(-2.0, 2.0)
+        sag = 2e-3 * size * (1 - np.exp(-np.arange(n) / 20))
+        moved = np.r_[np.zeros(time.size), one.compared] + sag
+        output = moved + 2e-5 * rng.standard_normal(n)
+        u = np.r_[np.zeros(time.size), one.driven_by]
+        signals.append(
+            replace(one, driven_by=u, input=u, output=output, compared=output)
+        )
+    found = noise_floor(replace(of, signals=tuple(signals)))
+    if is_common:
+        assert found.rms == pytest.approx(2e-5, rel=0.3)
+    else:
+        # Each its own: slow noise looks like that.
+        assert found.method == "rest"
+        assert found.rms > 2e-4

@@ -479,3 +479,13 @@ def test_what_stands_for_a_slow_process_has_no_short_steps(stiffness, lag_s):
     )  # fmt: skip
     found = _no_faster_than_seen(massless, [SimpleNamespace(sample_time_s=1.0)])
     assert found.mass_kg == pytest.approx(120.0 * lag_s, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("own", "first", "is_in_balance"),
+    [((3.0, 0.0), 0.0, False), ((3.0, 0.0), 1e-2, True), ((0.0, 0.5), 0.5, False)],
+)
+def test_a_start_of_a_speed_is_compared_with_the_speed(own, first, is_in_balance):
+    run_with_force = SimulatorRun(np.linspace(first, 1.0, 50), NOTHING)
+    one = replace(signals(INPUTS[0]), own_start=own, is_velocity=True)
+    assert starts_in_balance(one, run_with_force) is is_in_balance

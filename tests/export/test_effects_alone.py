@@ -235,3 +235,16 @@ def test_s_function_moves_a_mass_as_the_effect_does(name, tmp_path):
         CURRENT.size, CURRENT.ctypes.data_as(double), output.ctypes.data_as(double)
     )
     assert np.std(output - truth) < 0.01 * np.std(truth - bare)
+
+
+def test_modelica_text_reads_a_velocity_where_one_is_measured():
+    speed = extended_with({"sensor_saturation": {"limit_m": 0.2}})
+    plain, both = (
+        replace(one, output="velocity") for one in (speed.plain, speed.stand_in)
+    )
+    speed = replace(speed, plain=plain, stand_in=both)
+    text = modelica_text(speed, replace(CARD, output_unit="m/s"))
+    assert 'input Real x "position of the simulation, m"' in text
+    reading = re.search(r"  y = (.*);", text)[1]
+    assert re.search(r"\bv\b", reading)
+    assert not re.search(r"\bx\b", reading)
