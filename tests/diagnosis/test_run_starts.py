@@ -146,3 +146,21 @@ def test_starts_count_where_half_of_the_squares_go_with_them(size):
     )
     found = starts_above(apart, given, is_said=False)
     assert bool(found) == (after <= 0.5 * before)
+
+
+def test_of_speeds_a_start_is_the_zero_of_the_sensor():
+    """A speed says nothing of the place that effects may go with."""
+
+    def run(request):
+        return simulate(request, 0.0)
+
+    simulator = Simulator(ABLE, run, {}, {}, {}, output="velocity")
+    problem = prepare(
+        recordings(STARTS),
+        its_own(simulator),
+        DiagnoseOptions(initial_state="held"),
+        (),
+    )
+    begun = begin(problem, simulator, DiagnoseOptions(initial_state="held"), Count())
+    assert begun.starts.above
+    assert not begun.starts.are_places
