@@ -14,7 +14,8 @@ from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities
 from tests.black_boxes.plants import Hidden
-from tests.diagnosis.made_up_fits import made_up
+from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
+from tests.diagnosis.small_drive import problem, recordings
 from tests.diagnosis.test_foreign import FREE, GIVEN, TRUE, diagnosis, simulate
 
 FEW = ("coulomb_friction", "quadratic_drag", "cubic_stiffness", "input_delay")
@@ -78,3 +79,39 @@ def test_one_effect_stays_alone_where_no_second_may_be_asked_for(
     assert with_further_effect(first, None, options, None) is first
     nothing = BySingleEffects(None, {}, is_all=False)
     assert with_further_effect(nothing, None, options, None) is nothing
+
+
+@pytest.mark.parametrize(("left", "is_pair"), [(109.0, False), (100.0, True)])
+def test_a_pair_is_told_only_where_it_may_be_named(monkeypatch, left, is_pair):
+    """Beside it stands all that was fitted before, and the first effect itself."""
+    one, two = "coulomb_friction", "cubic_stiffness"
+    alone = made_up((one,), 110.0, whiteness=0.5 if not is_pair else 3.0)
+    both = made_up((two,), left, parameters=2, whiteness=0.5)
+    of = problem(recordings({}))
+    monkeypatch.setattr(further_effects, "unclear_effects", lambda *_: ())
+    monkeypatch.setattr(further_effects, "replace", replaced)
+
+    def findings(chosen, fits):
+        return SimpleNamespace(
+            problem=of, criteria=CRITERIA, base=base(), given_sse=np.full(6, 500.0),
+            found=SimpleNamespace(fits=fits), scales=None,
+            verdict=SimpleNamespace(chosen=chosen),
+        )  # fmt: skip
+
+    first = findings(alone, {(one,): alone})
+    again = made_up((one,), 1.0)
+    found = further_effects._with_known(
+        first, findings(both, {(two,): both, (one,): again}), one
+    )
+    assert (found is not None) == is_pair
+    if found is not None:
+        assert found.verdict.chosen.effects == (one, two)
+        assert set(found.found.fits) == {(one,), (one, two)}
+        assert found.found.fits[(one,)] is alone
+
+
+def replaced(what, **changes):
+    """As ``dataclasses.replace``, of what stands for a record too."""
+    if isinstance(what, SimpleNamespace):
+        return SimpleNamespace(**{**vars(what), **changes})
+    return replace(what, **changes)

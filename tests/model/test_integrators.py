@@ -146,6 +146,10 @@ def test_what_starts_steady_under_an_input_is_no_integrator(order):
     assert all(abs(np.sum(one.denominator)) > 1e-6 for one in found)
     free = replace(steady, initial_state="estimated")
     assert circle_starts(experiments, Orders(1, order, 1), free, np.array([0.99]))
+    # Where the first input is 0 an integrator rests.
+    resting = [FitData(np.r_[0.0, u[1:]], y)]
+    found = circle_starts(resting, Orders(1, order, 1), steady, np.array([0.99]))
+    assert any(abs(np.sum(one.denominator)) < 1e-9 for one in found)
 
 
 @pytest.mark.thorough
