@@ -37,7 +37,7 @@ def with_further_effect(
         The first one itself where no run with two effects may be named.
     """
     one = first.findings
-    if one is None or options.max_effects < 2:
+    if one is None or options.max_effects < 2 or not one.verdict.chosen.effects:
         return first
     chosen = one.verdict.chosen
     (known,) = chosen.effects

@@ -105,7 +105,7 @@ def _of_file(file: str, source: str) -> HammersteinWiener:
     return replace(found.model, sample_time_s=found.sample_time_s)
 
 
-_VELOCITIES = ("velocity", "angular velocity")
+_VELOCITIES = {"velocity", "angular velocity"}
 # Fewer recordings than these say too little alone.
 _FEWEST_UNCOVERED = 3
 
@@ -191,8 +191,8 @@ def simulator_of(
 
 def _compared(recordings: Sequence[Recording]) -> str:
     """What the recordings are of; one of ``records.drive.OUTPUTS``."""
-    is_velocity = quantity_of(recordings[0].output_unit) in _VELOCITIES
-    return "velocity" if is_velocity else "position"
+    quantities = {quantity_of(one.output_unit) for one in recordings[:1]}
+    return "velocity" if quantities & _VELOCITIES else "position"
 
 
 def _given_outputs(

@@ -47,7 +47,7 @@ def simulate(time_s, inputs, parameters):
             k4 = rates(moved(y, h, k3), u[n] + b * du, push[n] + b * dpush, parameters)
             whole = [p + 2 * q + 2 * r + s for p, q, r, s in zip(k1, k2, k3, k4)]
             y = moved(y, h / 6, whole)
-    return {{"{output}": out[:, {sees}]}}
+    return {{"{output}": out[:, {sees}], "speed": out[:, 1]}}
 
 
 def moved(y, h, rate):
