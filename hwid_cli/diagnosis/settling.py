@@ -44,7 +44,7 @@ def settled(
 ) -> Turn | None:
     """Best run of the simulation with a set of effects; None if it is no better."""
     has_force = runs.simulator.capabilities.force
-    at_force = acts_at_force(fit, runs)
+    at_force = acts_at_force(findings.problem, fit, runs)
     said = float(fit.sse.sum())
     turn = Turn(findings.problem, fit, values, said, at_force)
     best = _best_of(findings, turn, runs)

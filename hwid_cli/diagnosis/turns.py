@@ -38,7 +38,7 @@ from hwid_cli.diagnosis.stand_in import (
     force_of_motion,
     starts_in_balance,
 )
-from hwid_cli.drive.simulation import Motion
+from hwid_cli.drive.simulation import Motion, drive_effects
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.programs import SimulatorRun
@@ -239,9 +239,13 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
     return _with_values(following, (found, forces), runs, findings)
 
 
-def acts_at_force(fit: CandidateFit, runs: Runs) -> bool:
-    """Whether effects act at a simulation's force input rather than through its input."""
-    return runs.simulator.capabilities.force and act_as_forces(fit.effects)
+def acts_at_force(problem: DiagnosisProblem, fit: CandidateFit, runs: Runs) -> bool:
+    """Whether effects act at a simulation's force input rather than through its input.
+
+    Those that the drive has already are among them.
+    """
+    effects = (*drive_effects(problem.drive), *fit.effects)
+    return runs.simulator.capabilities.force and act_as_forces(effects)
 
 
 def forces_along(

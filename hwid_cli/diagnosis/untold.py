@@ -233,7 +233,7 @@ class _Moving:
                 for force, one in zip(of_all, findings.problem.signals, strict=True)
                 if not one.is_held_out
             )
-        at_force = acts_at_force(chosen, runs)
+        at_force = acts_at_force(findings.problem, chosen, runs)
         noise = findings.criteria.noise.rms
         return cls(runs, problem, values, free, forces, at_force, noise)
 

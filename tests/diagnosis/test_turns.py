@@ -1,5 +1,6 @@
 """How long stand-in and simulation take turns."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from hwid_cli.diagnosis import turns
 from hwid_cli.diagnosis.turns import Turn, best_turn
 from tests.diagnosis.made_up_fits import made_up
+from tests.diagnosis.small_drive import problem, recordings
 
 FIT = made_up(("coulomb_friction",), 100.0)
 
@@ -66,3 +68,25 @@ def test_two_turns_that_agree_are_enough_once_nothing_is_gained(taken):
     assert taken([50.0, 49.9, 1.0], agrees=True) == (2, 49.9)
     count, left = taken([50.0, 49.0, 48.0, 47.9, 1.0], agrees=True)
     assert (count, left) == (4, 47.9)
+
+
+@pytest.mark.parametrize(
+    ("present", "effect", "is_force"),
+    [
+        ("constant_load", "output_backlash", True),
+        ("input_delay", "output_backlash", False),
+        ("", "output_backlash", False),
+        ("", "coulomb_friction", True),
+    ],
+)
+def test_a_force_that_the_drive_has_already_acts_at_the_force_input(
+    present, effect, is_force
+):
+    """Through the input of a loop inside the simulation it would be another force."""
+    values = {"constant_load": {"force_N": 1.0}, "input_delay": {"delay_s": 1e-3}}
+    of = problem(recordings({}))
+    drive = replace(of.drive, effects={one: values[one] for one in (present,) if one})
+    able = SimpleNamespace(capabilities=SimpleNamespace(force=True))
+    runs = SimpleNamespace(simulator=able)
+    fit = made_up((effect,), 1.0)
+    assert turns.acts_at_force(replace(of, drive=drive), fit, runs) is is_force
