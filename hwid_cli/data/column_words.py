@@ -108,10 +108,14 @@ _OUTPUT = [
 # Rank of a role that no word tells, but the unit.
 OF_UNIT = 99
 # Of several outputs these are hardly ever meant: how warm a machine is, how it shakes.
-_HARDLY_MEANT = {
-    **dict.fromkeys(("temperature", "temperatur", "temp"), 101),
-    **dict.fromkeys(("acceleration", "beschleunigung", "acc"), 100),
-}
+_HARDLY_MEANT = [
+    "acceleration",
+    "beschleunigung",
+    "acc",
+    "temperature",
+    "temperatur",
+    "temp",
+]
 # Words that say that something was measured: another word, or the unit, says what.
 _MEASURED = ["measured", "measurement", "istwert", "fb", "feedback"]
 _TIME = [
@@ -273,12 +277,12 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
             found = _rank(word, known)
             if found is not None and not role:
                 role, rank, used = name, found, word
-    if role == "output" and (last := _rank(used, list(_HARDLY_MEANT))) is not None:
-        rank = list(_HARDLY_MEANT.values())[last]
+    if role == "output" and (last := _rank(used, _HARDLY_MEANT)) is not None:
+        rank = OF_UNIT + 1 + last
     if not unit and any(word in _STATES for word in words):
         role, rank, used = "counter", OF_UNIT, ""
     if role == "time" and used == "t" and _is_temperature(words, unit):
-        role, rank = "output", _HARDLY_MEANT["temp"]
+        role, rank = "output", OF_UNIT + len(_HARDLY_MEANT)
     elif unit and (not role or _is_contradicted(role, used, unit)):
         role, rank, used = _role_of_unit(unit), OF_UNIT, ""
     is_wanted = any(word in _WANTED and word != used for word in words)

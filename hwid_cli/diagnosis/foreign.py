@@ -185,7 +185,8 @@ def _found(
 
     Where one that explains most has moved the parameters, these had imitated it: no set is
     looked for beside a stand-in of the old ones. One that the simulation's own run bears
-    out stays where no set, which a stand-in has chosen, leaves less.
+    out stays where no set, which a stand-in has chosen, leaves less; a second one is looked
+    for beside it first.
 
     Parameters
     ----------

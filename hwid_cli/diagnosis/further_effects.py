@@ -13,7 +13,7 @@ from hwid_cli.diagnosis.effect_sets import with_effect
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.simulator import Runs
-from hwid_cli.diagnosis.single_effects import BySingleEffects, single_in_simulation
+from hwid_cli.diagnosis.single_effects import ToldByRuns, single_in_simulation
 from hwid_cli.diagnosis.tasks import OnRound
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.drive.catalogue import CATALOGUE
@@ -22,18 +22,18 @@ from hwid_cli.records.experiment import DiagnoseOptions
 
 
 def with_further_effect(
-    first: BySingleEffects, runs: Runs, options: DiagnoseOptions, on_round: OnRound
-) -> BySingleEffects:
+    first: ToldByRuns, runs: Runs, options: DiagnoseOptions, on_round: OnRound
+) -> ToldByRuns:
     """The first effect with a second one, where the simulation's own run leaves less.
 
     Parameters
     ----------
-    first : BySingleEffects
+    first : ToldByRuns
         Of the simulation's run with the first effect.
 
     Returns
     -------
-    BySingleEffects
+    ToldByRuns
         The first one itself where no run with two effects may be named.
     """
     one = first.findings
@@ -56,7 +56,7 @@ def with_further_effect(
     if both is None:
         return first
     is_all = both.criteria.is_nearly_all(both.verdict.chosen, both.base)
-    return BySingleEffects(both, second.values, is_all)
+    return ToldByRuns(both, second.values, is_all)
 
 
 def _with_known(first: Findings, second: Findings, known: str) -> Findings | None:

@@ -41,8 +41,8 @@ _CLEARLY_LESS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class BySingleEffects:
-    """What runs with single effects tell.
+class ToldByRuns:
+    """What runs of the simulation with effects in it tell.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class BySingleEffects:
 
 def single_in_simulation(
     findings: Findings, runs: Runs, values: dict[str, float], on_round: OnRound
-) -> BySingleEffects:
+) -> ToldByRuns:
     """Put the likely single effects into the simulation, and let its runs decide.
 
     Where the simulation is not linear, what the stand-in leaves of a large effect is its
@@ -74,10 +74,10 @@ def single_in_simulation(
         Of single effects.
     """
     if not findings.base.is_usable:
-        return BySingleEffects(None, values, is_all=False)
+        return ToldByRuns(None, values, is_all=False)
     alone = _base_in_simulation(findings, runs, values)
     if alone is not None:
-        return BySingleEffects(*alone, is_all=True)
+        return ToldByRuns(*alone, is_all=True)
     tried: dict[tuple[str, ...], Turn] = {}
     fits: dict[tuple[str, ...], CandidateFit] = {}
     likely = _likely(findings)
@@ -99,9 +99,9 @@ def single_in_simulation(
     if decided is not None:
         told, moved = decided
         is_all = findings.criteria.is_nearly_all(told.verdict.chosen, findings.base)
-        return BySingleEffects(told, moved, is_all)
+        return ToldByRuns(told, moved, is_all)
     moved = _moved_by_best(findings, tried, fits, values)
-    return BySingleEffects(None, moved, is_all=False)
+    return ToldByRuns(None, moved, is_all=False)
 
 
 def _twins_in_simulation(

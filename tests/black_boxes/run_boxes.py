@@ -58,13 +58,8 @@ def write_case(folder, plant, effect, *, access, noise, seed, most="", log_noise
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "raw").mkdir(exist_ok=True)
     signals = list(inputs(plant, rng))
-    x_max, y_max = (
-        max(
-            float(np.max(np.abs(integrate(one, one.values, u, DT, finer=1))))
-            for _, u in signals
-        )
-        for one in (replace(plant, sees=0), plant)
-    )
+    x_max = _largest(replace(plant, sees=0), signals)
+    y_max = _largest(plant, signals) if plant.sees else x_max
     rates, zero = plant.function(), np.zeros(plant.n_states)
     gain = _force_gain(rates, zero, plant)
     load = gain * float(np.sqrt(np.mean([np.mean(u**2) for _, u in signals])))
@@ -100,6 +95,12 @@ def write_case(folder, plant, effect, *, access, noise, seed, most="", log_noise
     (folder / "runs.txt").unlink(missing_ok=True)
     (folder / "config.yaml").write_text(_config(plant, given, access, most))
     (folder / "truth.json").write_text(json.dumps({"accepted": hidden.accepted}))
+
+
+def _largest(plant, signals):
+    """Largest reading without any effect."""
+    found = [integrate(plant, plant.values, u, DT, finer=1) for _, u in signals]
+    return max(float(np.max(np.abs(one))) for one in found)
 
 
 def _force_gain(rates, zero, plant):

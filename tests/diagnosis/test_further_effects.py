@@ -9,7 +9,7 @@ import pytest
 from hwid_cli.diagnosis import foreign, further_effects
 from hwid_cli.diagnosis.further_effects import with_further_effect
 from hwid_cli.diagnosis.simulator import Simulator
-from hwid_cli.diagnosis.single_effects import BySingleEffects
+from hwid_cli.diagnosis.single_effects import ToldByRuns
 from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities
@@ -74,10 +74,10 @@ def test_one_effect_stays_alone_where_no_second_may_be_asked_for(
     monkeypatch.setattr(further_effects, "find", None)
     chosen = made_up((effect,), 1.0, parameters=1)
     one = SimpleNamespace(verdict=SimpleNamespace(chosen=chosen))
-    first = BySingleEffects(one, {}, is_all=False)
+    first = ToldByRuns(one, {}, is_all=False)
     options = DiagnoseOptions(max_effects=most)
     assert with_further_effect(first, None, options, None) is first
-    nothing = BySingleEffects(None, {}, is_all=False)
+    nothing = ToldByRuns(None, {}, is_all=False)
     assert with_further_effect(nothing, None, options, None) is nothing
 
 
