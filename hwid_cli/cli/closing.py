@@ -62,7 +62,8 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
         rows += [("best model", one) for one in best_model_sentences(best)]
     advice = session.results.get("order")
     if advice is not None and name == _RUN:
-        maps = advice.maps if best is None or best.is_usable else None
+        asks_for_maps = best is None or (best.is_usable and not best.own_maps)
+        maps = advice.maps if asks_for_maps else None
         rows.append(("orders", orders_sentence(advice.orders, maps)))
     if diagnosis is not None:
         rows.append(("simulation", diagnosis_sentence(diagnosis)))

@@ -403,11 +403,12 @@ def _validation_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
 
 
 def _group_lines(proposal: Proposal) -> list[str]:
-    if len(proposal.identify) < 3:
+    if len(proposal.identify) < 2:
         return []
     return [
-        "# Models of several recordings together: takes longer, covers more.",
-        "# group: {keep: {top: 2}, max_level: 3}",
+        "# One model of all of them beside those of single ones: few recordings are worth most",
+        "# together. Smaller groups take longer: keep: {top: 2}, max_level: 3 tries them.",
+        "group: {max_level: 1, together: true}",
     ]
 
 

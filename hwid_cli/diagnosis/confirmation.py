@@ -39,17 +39,17 @@ def confirm(
         return findings, values, True
     best = settled(findings, chosen, runs, values)
     if best is None:
-        return _unconfirmed(findings), values, False
+        return unconfirmed(findings), values, False
     found, criteria = _with_run(findings, best), findings.criteria
     run = found.verdict.chosen
     is_enough = is_as_good(best) or criteria.is_nearly_all(run, findings.base)
     may_be_named = not (criteria.replaces(run) or criteria.imitates_one_law(run))
     if is_enough and may_be_named:
         return found, best.values_of_run, True
-    return _unconfirmed(findings), best.values_of_run, False
+    return unconfirmed(findings), best.values_of_run, False
 
 
-def _unconfirmed(findings: Findings) -> Findings:
+def unconfirmed(findings: Findings) -> Findings:
     """Findings whose effects the simulation itself, with them in it, does not bear out.
 
     What a stand-in says is no fact where the simulation says otherwise; it stays a lead.

@@ -13,7 +13,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate import fitted_drive
 from hwid_cli.diagnosis.causes import without_repeats
-from hwid_cli.diagnosis.confirmation import confirm
+from hwid_cli.diagnosis.confirmation import confirm, unconfirmed
 from hwid_cli.diagnosis.diagnose import find, held_out_of
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.further_effects import with_further_effect
@@ -73,13 +73,13 @@ def diagnose_foreign(
         Computes tasks, runs of the simulation among them, or takes their results from
         where it kept them.
     """
-    run_tasks = counted = CountedRuns(run_tasks)
+    counted = CountedRuns(run_tasks, options.max_runs)
     on_round = counted.told(on_round)
     held_out = held_out_of(recordings, options)
     problem = prepare(recordings, its_own(simulator), options, held_out)
     problem = without_repeats(problem)
     on_round("the simulation as given", len(problem.signals))
-    begun = begin(problem, simulator, options, run_tasks)
+    begun = begin(problem, simulator, options, counted)
     runs, given, refitted = begun.runs, list(begun.given), dict(simulator.values)
     if simulator.free and not simulator.is_extended:
         on_round("its parameters", 0)
@@ -159,6 +159,8 @@ def _searched(
             found.verdict.chosen, found.base
         ):
             break
+        if runs.run_tasks.are_spent:
+            break
         # Parameters that imitated what is missing have led elsewhere; or to where nothing
         # holds in the simulation: the given ones have imitated nothing yet.
         is_in_vain = count == _MOST_SEARCHES - 2 and not is_confirmed
@@ -214,6 +216,9 @@ def _found(
         if alone.findings is not None and alone.is_all:
             return alone.findings, alone.values, True
     one = None if alone is None else alone.findings
+    if alone is not None and runs.run_tasks.are_spent:
+        is_told = one is not None
+        return one or unconfirmed(found), alone.values, is_told
     # What a stand-in leaves of an effect that runs bear out is its own error: pieces,
     # which are asked where nothing is settled, would only repeat it.
     found = find(
@@ -261,6 +266,7 @@ def _law_instead(
         Parameters of the simulation that no effect has moved.
     """
     is_open = options.laws == "auto" and options.effects is None
+    is_open = is_open and not runs.run_tasks.are_spent
     if not is_open or verdict.word not in _NAMED or verdict.is_complete:
         return None
     on_round("a law instead", 0)

@@ -39,6 +39,8 @@ def with_further_effect(
     one = first.findings
     if one is None or options.max_effects < 2 or not one.verdict.chosen.effects:
         return first
+    if runs.run_tasks.are_spent:
+        return first
     chosen = one.verdict.chosen
     (known,) = chosen.effects
     if any(each.is_own for each in CATALOGUE[known].parameters):

@@ -11,9 +11,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
-from hwid_cli.diagnosis.simulator import Runs, Simulator
+from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
 from hwid_cli.diagnosis.stand_in_fit import fit_stand_in
-from hwid_cli.diagnosis.tasks import RunTasks
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import SimulatorRun
 
@@ -94,7 +93,7 @@ def begin(
     problem: DiagnosisProblem,
     simulator: Simulator,
     options: DiagnoseOptions,
-    run_tasks: RunTasks,
+    run_tasks: CountedRuns,
 ) -> Begun:
     """Run a simulation as it is given, from where the recordings start."""
     runs = Runs(simulator, run_tasks)

@@ -40,13 +40,24 @@ _CUT_OFF = 0.9
 
 
 def settled(
-    findings: Findings, fit: CandidateFit, runs: Runs, values: dict[str, float]
+    findings: Findings,
+    fit: CandidateFit,
+    runs: Runs,
+    values: dict[str, float],
+    rival: float = np.inf,
 ) -> Turn | None:
-    """Best run of the simulation with a set of effects; None if it is no better."""
+    """Best run of the simulation with a set of effects; None if it is no better.
+
+    Parameters
+    ----------
+    rival : float, [output unit squared]
+        What the best run with other effects leaves: no further way is tried with what
+        leaves far more.
+    """
     has_force = runs.simulator.capabilities.force
     at_force = acts_at_force(findings.problem, fit, runs)
     said = float(fit.sse.sum())
-    turn = Turn(findings.problem, fit, values, said, at_force)
+    turn = Turn(findings.problem, fit, values, said, at_force, rival=rival)
     best = _best_of(findings, turn, runs)
     without = float(findings.base.sse.sum())
     if (
@@ -54,6 +65,7 @@ def settled(
         and has_force
         and not at_force
         and best.sse.sum() > _CUT_OFF * without
+        and not best.is_far_behind
     ):
         # A map of the simulation may cut off what should come through its input.
         other = _best_of(findings, replace(turn, at_force=True), runs)
@@ -73,6 +85,8 @@ def _best_of(findings: Findings, turn: Turn, runs: Runs) -> Turn:
         return best_turn(findings, turn, runs)
     first = replace(turn, problem=held(findings.problem))
     best = best_turn(findings, first, runs)
+    if best.is_far_behind or runs.run_tasks.are_spent:
+        return best
     if not is_as_good(best):
         best = min(best, _again(findings, turn, runs), key=_left_by)
     # Forces in the place of parameters that nobody could find would pass for the effect's.
@@ -132,7 +146,7 @@ def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
     )
     there = held(replace(standing, signals=signals))
     fit = where_it_starts(there, without_base(fit))
-    return Turn(there, fit, values, turn.said, turn.at_force)
+    return Turn(there, fit, values, turn.said, turn.at_force, rival=turn.rival)
 
 
 def _standing_with(

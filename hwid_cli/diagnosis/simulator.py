@@ -62,11 +62,22 @@ class Simulator:
 
 
 class CountedRuns:
-    """Runs tasks as another one does, and counts runs of a simulation among them."""
+    """Runs tasks as another one does, and counts runs of a simulation among them.
 
-    def __init__(self, run_tasks: RunTasks) -> None:
+    Parameters
+    ----------
+    most : float
+        After so many of them nothing is tried that may be left out.
+    """
+
+    def __init__(self, run_tasks: RunTasks, most: float = np.inf) -> None:
         self.count = 0
-        self._run_tasks = run_tasks
+        self._run_tasks, self._most = run_tasks, most
+
+    @property
+    def are_spent(self) -> bool:
+        """Whether the search has to do with what it has."""
+        return self.count >= self._most
 
     def __call__(self, tasks: Sequence[DiagnosisTask], *, keep: bool) -> list[Any]:
         """Results in the order of the tasks."""
@@ -96,7 +107,7 @@ class Runs:
     """
 
     simulator: Simulator
-    run_tasks: RunTasks
+    run_tasks: CountedRuns
     starts: Mapping[str, float] = field(default_factory=dict)
 
     def of(

@@ -8,6 +8,8 @@ docs/method_diagnosis.md, eq. (D33).
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.selection import (
@@ -82,14 +84,16 @@ def single_in_simulation(
     fits: dict[tuple[str, ...], CandidateFit] = {}
     likely = _likely(findings)
     for place, one in enumerate(likely, 1):
-        if _is_settled_by(findings, one, list(fits.values())):
+        is_enough = bool(fits) and runs.run_tasks.are_spent
+        if is_enough or _is_settled_by(findings, one, list(fits.values())):
             continue
         (effect,) = one.effects
         what = f"single effects in the simulation, {place} of {len(likely)}"
         what = f"{what}, {public_id(effect)}"
         so_far = fits.values()
         on_round(with_best_so_far(what, findings.criteria, so_far, findings.base), 0)
-        turn = settled(findings, one, runs, values)
+        rival = min((fit.sse.sum() for fit in fits.values()), default=np.inf)
+        turn = settled(findings, one, runs, values, float(rival))
         if turn is not None:
             tried[one.effects], fits[one.effects] = turn, fit_of_run(findings, turn)
     for turn in _twins_in_simulation(findings, runs, tried, fits):

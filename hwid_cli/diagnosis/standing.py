@@ -13,7 +13,7 @@ from hwid_cli.diagnosis.diagnose import held_out_of
 from hwid_cli.diagnosis.force_scale import force_in_newtons
 from hwid_cli.diagnosis.problem import DiagnosisProblem, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin
-from hwid_cli.diagnosis.simulator import Runs, Simulator
+from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
 from hwid_cli.diagnosis.stand_in import (
     error_of,
     force_along,
@@ -55,7 +55,7 @@ def as_given(
     """
     held_out = held_out_of(recordings, options)
     problem = prepare(recordings, its_own(simulator), options, held_out)
-    return begin(problem, simulator, options, run_tasks)
+    return begin(problem, simulator, options, CountedRuns(run_tasks))
 
 
 def stand_in_for(begun: Begun, *, may_curve: bool = True) -> StandIn:

@@ -54,7 +54,11 @@ _WORTH_A_FIT = 2.0
 # Turns in a row that leave more than the stand-in said, and more than this share of the best
 # run before: there it does not settle.
 _MOST_IN_VAIN = 3
+# Squares over those that are left without the effect, from which on none follows.
+_FAR_OFF = 10.0
 _WORTH_A_TURN = 0.95
+# Squares over those that another effect's run leaves, from which on so many turns are enough.
+_FAR_BEHIND, _FEW_TURNS = 3.0, 3
 # Turns that agree go on while each leaves less than this share of the last one.
 _SETTLED = 0.995
 # Over the noise, what a run may leave because its effect is a little late at corners.
@@ -85,6 +89,8 @@ class Turn:
         Sum of squares that the stand-in alone left.
     at_force : bool
         Whether forces act at the simulation's force input, not through its input.
+    rival : float, [output unit squared]
+        Sum of squares that the best run with other effects left.
     tried : tuple of CandidateFit and dict of str to float, or None
         What the simulation itself was run with.
     slopes : tuple of ndarray, shape (n_samples, n_free)
@@ -104,6 +110,7 @@ class Turn:
     values: dict[str, float]
     said: float
     at_force: bool
+    rival: float = np.inf
     tried: tuple[CandidateFit, dict[str, float]] | None = None
     slopes: tuple[np.ndarray, ...] = ()
     slopes_at: dict[str, float] = field(default_factory=dict)
@@ -115,6 +122,11 @@ class Turn:
     def sse(self) -> np.ndarray:
         """Sum of squares of each recording that the run left; infinite without one."""
         return each_sum_of_squares(self.left) if self.left else np.array([np.inf])
+
+    @property
+    def is_far_behind(self) -> bool:
+        """Whether the run leaves far more than one with other effects."""
+        return bool(self.sse.sum() > _FAR_BEHIND * self.rival)
 
     @property
     def values_of_run(self) -> dict[str, float]:
@@ -168,10 +180,15 @@ def best_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn:
         turn = following
         is_worth_it = turn.sse.sum() < _WORTH_A_TURN * best.sse.sum()
         in_vain = 0 if is_worth_it or is_as_good(turn) else in_vain + 1
+        if turn.sse.sum() > _FAR_OFF * findings.base.sse.sum():
+            # No step of the stand-in leads back from there.
+            in_vain = _MOST_IN_VAIN
         if turn.sse.sum() < best.sse.sum():
             best = turn
         if turn.ran_away:
             return replace(best, ran_away=True)
+        if count >= _FEW_TURNS - 1 and best.is_far_behind:
+            break
         if count >= _MOST_TURNS - 1 and not (is_worth_it and is_as_good(turn)):
             break
         agreed = agreed + 1 if _agrees(findings, turn) and is_as_good(turn) else 0
@@ -225,6 +242,7 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
         values=turn.values,
         said=turn.said,
         at_force=turn.at_force,
+        rival=turn.rival,
         slopes=turn.slopes,
         slopes_at=turn.slopes_at,
         tried=(fit, turn.values),

@@ -70,6 +70,9 @@ class BestModel:
     has_estimated_starts : bool
         Whether each simulation started from a state that its measured output told: a
         prediction has none.
+    own_maps : tuple of (str, int)
+        Kind and units of its maps, input and output, where it was given others than the
+        configuration's; empty else. No units where a kind has none.
     """
 
     name: str
@@ -87,6 +90,7 @@ class BestModel:
     linear_name: str = ""
     linear_ratio: float = float("nan")
     has_estimated_starts: bool = False
+    own_maps: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
         if self.judge not in JUDGES:

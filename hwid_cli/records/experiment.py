@@ -189,7 +189,14 @@ class OrderOptions:
 
 @dataclass(frozen=True)
 class GroupOptions:
-    """The greedy search for groups of recordings."""
+    """The greedy search for groups of recordings.
+
+    Parameters
+    ----------
+    together : bool
+        Whether all candidates make one group as well, and the closest group wins rather
+        than the widest.
+    """
 
     start: _Names = None
     candidates: _Names = None
@@ -198,6 +205,7 @@ class GroupOptions:
         default_factory=lambda: {"top": 3}
     )
     max_level: Annotated[int, Integer(least=1), FileLimit(1000)] = 4
+    together: bool = False
     warm_start: bool = True
 
 
@@ -328,6 +336,8 @@ class DiagnoseOptions:
     laws : str
         When a formula is looked for: where all effects may be named and something is
         left, in place of the catalogue, or never.
+    max_runs : int
+        Of a simulation of one's own: after so many of them no further way is tried.
     own_effects : dict of str to OwnEffect
         Formulas that are tried beside the catalogue; a section of their own in a file.
     """
@@ -343,6 +353,7 @@ class DiagnoseOptions:
         None
     )
     max_effects: Annotated[int, Integer(least=0), FileLimit(1000)] = 3
+    max_runs: Annotated[int, Integer(least=1)] = 2000
     laws: Annotated[str, OneOf(("auto", "only", "never"))] = "auto"
     initial_state: Annotated[str, OneOf(STARTS)] = "rest"
     skip_samples: Annotated[int, Integer(least=0)] = 0

@@ -11,7 +11,7 @@ from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.next import NextRecordings
 from hwid_cli.records.order import MapAdvice, OrderAdvice
 from hwid_cli.report.formats import counted, listed, with_unit
-from hwid_cli.report.map_words import fit_keys
+from hwid_cli.report.map_words import fit_keys, map_words
 from hwid_cli.report.orders import axes_to_widen, delay_keys, delays_to_try
 
 # Room for the words on the left, [characters].
@@ -92,6 +92,9 @@ def best_model_sentences(best: BestModel) -> list[str]:
     if best.is_linear_better:
         return _linear_sentences(best, mean, on)
     said = [f"{best.name}: {mean} {with_unit(best.rmsd, best.unit)} on {on}"]
+    if best.own_maps:
+        maps = " and ".join(map_words(*one) for one in best.own_maps)
+        said.append(f"its maps, {maps}, come closest to recordings left out in turn")
     if np.isfinite(best.linear_rmsd):
         linear = with_unit(best.linear_rmsd, best.unit)
         said.append(f"{_linear_model(best)}: {linear}")

@@ -26,6 +26,7 @@ from hwid_cli.stages.linear_reference import Roles, linear_reference
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.order import recommend_overall
 from hwid_cli.stages.order_grid import grid_place
+from hwid_cli.stages.together import own_maps
 
 
 def model_answer(
@@ -85,7 +86,11 @@ def model_answer(
         threshold=_threshold(crossval or final),
         advice=advice,
         maps=maps,
-        has_these_maps=maps is None or _has_maps(found, maps),
+        has_these_maps=(
+            maps is None
+            or _has_maps(found, maps)
+            or bool(own_maps(found, fits.values()))
+        ),
         noise_rms=differences_rms([one.output for one in unseen], 0.0) or np.nan,
     )
     name = _at(advice, found, named, stored.nk_role)

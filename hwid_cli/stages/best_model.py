@@ -23,6 +23,7 @@ from hwid_cli.stages.linear_reference import Roles, linear_reference
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import best_fits, widest_model
 from hwid_cli.stages.test import best_single, taken_model
+from hwid_cli.stages.together import own_maps
 
 
 def best_model(
@@ -181,7 +182,12 @@ def beside_linear(
     judges = [by_name[name] for name in best.judged_on]
     _, percent = _scores(found.model, judges)
     is_estimated = found.options.initial_state == "estimated"
-    beside = replace(best, fit_percent=percent, has_estimated_starts=is_estimated)
+    beside = replace(
+        best,
+        fit_percent=percent,
+        has_estimated_starts=is_estimated,
+        own_maps=own_maps(found, fits.values()),
+    )
     linear = linear_reference(
         found,
         fits.values(),

@@ -188,7 +188,11 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     )
     n = int(np.median([one.n_samples for one in usable] or [0]))
     n_orders = len(candidate_orders(experiment.orders))
-    fits = sum(bounds) * n_orders
+    sizes = [*enumerate(bounds, start=2)]
+    if options.together and n_candidates > max((size for size, _ in sizes), default=1):
+        sizes.append((n_candidates, 1))
+    n_groups = sum(count for _, count in sizes)
+    fits = n_groups * n_orders
     of_levels = [
         count
         * (
@@ -197,15 +201,16 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
             + TASK_SECONDS * (n_orders + n_validate)
         )
         / planning.workers
-        for level, count in enumerate(bounds, start=2)
+        for level, count in sizes
     ]
     plan = StagePlan(
         NAME,
-        f"at most {sum(bounds)} groups ({' + '.join(map(str, bounds))}), {fits} fits",
+        f"at most {n_groups} groups ({' + '.join(str(count) for _, count in sizes)}), "
+        f"{fits} fits",
         fits,
         None,
         sum(of_levels[:1]),
-        FIT_BYTES * fits + PAIR_BYTES * sum(bounds) * n_validate,
+        FIT_BYTES * fits + PAIR_BYTES * n_groups * n_validate,
         sum(of_levels),
         "the search goes on to the last level",
         is_shared=True,

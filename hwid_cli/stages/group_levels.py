@@ -25,13 +25,14 @@ from hwid_cli.records.groups import Group, GroupSearch
 from hwid_cli.records.model import Fit, FitOptions, HammersteinWiener, Orders
 from hwid_cli.records.recordings import Recording
 from hwid_cli.stages.crossval import deviation_tasks
-from hwid_cli.stages.group_search import search_groups
+from hwid_cli.stages.group_search import search_groups, with_whole
 from hwid_cli.stages.identify import Run, fit_grid
 from hwid_cli.stages.order_grid import (
     SEARCHED_ROUNDS_OF_GROUPS,
     candidate_orders,
     growth,
 )
+from hwid_cli.stages.together import fit_together
 from hwid_cli.tasks.cache import model_key, recording_key, task_key
 from hwid_cli.tasks.runner import Task, TaskDone
 
@@ -72,6 +73,11 @@ class GroupPlan:
         """Which validation recordings no group may hold, ndarray of bool, shape (m,)."""
         held = {*self.candidates, *(self.start or ())}
         return np.array([name not in held for name in self.validate], dtype=bool)
+
+    @property
+    def asks_for_whole(self) -> bool:
+        """Whether all candidates make one group as well."""
+        return self.options.together and len(self.candidates) > 1
 
 
 def fit_singles(
@@ -287,6 +293,10 @@ def search_all(plan: GroupPlan, run: RunLevel) -> GroupSearch:
         n_validate=len(plan.validate),
         is_ordered=plan.fit_options.join == "concatenate",
     )
+    if plan.asks_for_whole:
+        whole = _scored_whole(plan, run)
+        scored[whole.group.name] = whole
+        found = with_whole(found, whole.group)
     return GroupSearch(
         groups=found.groups,
         joins=found.joins,
@@ -299,6 +309,33 @@ def search_all(plan: GroupPlan, run: RunLevel) -> GroupSearch:
         unit=plan.recordings[0].output_unit,
         threshold=plan.threshold,
     )
+
+
+def _scored_whole(plan: GroupPlan, run: RunLevel) -> _Scored:
+    """The group of all candidates, whatever its model covers."""
+    own = [one for one in plan.recordings if one.name in plan.candidates]
+    level = len(own)
+    found = fit_together(
+        own,
+        plan.orders,
+        plan.fit_options,
+        lambda total, work: run(level, "fits", total, work),
+    )
+    group = tuple(one.name for one in own)
+    validation = [one for one in plan.recordings if one.name in plan.validate]
+    tasks = deviation_tasks(
+        [found.fit.model], validation, [recording_key(one) for one in validation],
+        "+".join(group),
+    )  # fmt: skip
+    done = _run_all(run, level, "pairs", tasks)
+    deviations = np.array([one.result.rmsd[0] for one in done])
+    blank = _blank(plan, group, found.n_models, deviations)
+    if found.fit.model is None:
+        return _Scored(blank, None, deviations)
+    chosen = _chosen(
+        plan, replace(blank, nb=found.nb, nk=found.nk), found.fit, deviations
+    )
+    return _Scored(chosen, found.fit, deviations)
 
 
 def _validate_level(
@@ -367,36 +404,59 @@ def _score_group(
     """Cross filter, and the best of the models that are left."""
     covered = coverage(deviations, plan.threshold)
     pooled = np.sqrt(np.mean(deviations**2, axis=1))
-    unseen = deviations[:, plan.is_unseen]
     # A model that diverges somewhere may still be the widest, but wins no tie.
     order = np.lexsort((np.where(np.isfinite(pooled), pooled, np.inf), -covered))
     best = int(order[0])
-    scored = Group(
+    blank = replace(
+        _blank(plan, group, len(fits), deviations[best]),
+        n_self_passed=sum(one is not None for one in _self_passed(plan, fits)),
+        n_cross_passed=int(np.sum(covered > 0)),
+    )
+    if covered[best] == 0:
+        return _Scored(blank, None, np.full(deviations.shape[1], np.nan))
+    nb, nk, _ = candidate_orders(plan.orders)[best]
+    chosen = _chosen(plan, replace(blank, nb=nb, nk=nk), fits[best], deviations[best])
+    return _Scored(chosen, fits[best], deviations[best])
+
+
+def _blank(
+    plan: GroupPlan, group: tuple[str, ...], n_models: int, deviations: np.ndarray
+) -> Group:
+    """A group before its model is known.
+
+    Parameters
+    ----------
+    deviations : ndarray, shape (m,), [output unit]
+        Of its best model on the validation recordings.
+    """
+    return Group(
         recordings=group,
-        coverage=int(covered[best]),
+        coverage=int(coverage(deviations[None], plan.threshold)[0]),
         nb=0,
         nk=0,
         rmsd=float("nan"),
         validation_rmsd=float("nan"),
-        n_models=len(fits),
-        n_self_passed=sum(one is not None for one in _self_passed(plan, fits)),
-        n_cross_passed=int(np.sum(covered > 0)),
+        n_models=n_models,
+        n_self_passed=n_models,
+        n_cross_passed=n_models,
         is_kept=False,
     )
-    if covered[best] == 0:
-        return _Scored(scored, None, np.full(deviations.shape[1], np.nan))
-    nb, nk, _ = candidate_orders(plan.orders)[best]
-    chosen = replace(
-        scored,
-        nb=nb,
-        nk=nk,
-        rmsd=fits[best].rmsd,
-        validation_rmsd=float(pooled[best]),
+
+
+def _chosen(plan: GroupPlan, blank: Group, fit: Fit, deviations: np.ndarray) -> Group:
+    """The same with how far its best model is off.
+
+    Parameters
+    ----------
+    deviations : ndarray, shape (m,), [output unit]
+    """
+    pooled = float(np.sqrt(np.mean(deviations**2)))
+    chosen = replace(blank, rmsd=fit.rmsd, validation_rmsd=pooled)
+    if not plan.is_unseen.any():
+        return chosen
+    unseen = deviations[plan.is_unseen]
+    return replace(
+        chosen,
+        unseen_coverage=int(coverage(unseen[None], plan.threshold)[0]),
+        unseen_rmsd=float(np.sqrt(np.mean(unseen**2))),
     )
-    if plan.is_unseen.any():
-        chosen = replace(
-            chosen,
-            unseen_coverage=int(coverage(unseen, plan.threshold)[best]),
-            unseen_rmsd=float(np.sqrt(np.mean(unseen[best] ** 2))),
-        )
-    return _Scored(chosen, fits[best], deviations[best])

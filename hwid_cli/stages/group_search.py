@@ -113,10 +113,25 @@ def search_groups(
             for one, flag in zip(level, flags, strict=True)
         ]
         if reason:
-            return Found(tuple(groups), tuple(joins), _chain(groups, joins), reason)
+            chain = _chain(groups, joins, _best_first)
+            return Found(tuple(groups), tuple(joins), chain, reason)
         joins += [join for join, _ in new]
         tried = list(dict.fromkeys(recordings for _, recordings in new))
         turn += 1
+
+
+def with_whole(found: Found, whole: Group) -> Found:
+    """The same with a group of all candidates; the closest group wins, whatever it covers."""
+    others = [
+        one for one in found.groups if set(one.recordings) != set(whole.recordings)
+    ]
+    joins = [one for one in found.joins if one.group in {each.name for each in others}]
+    base = min((one for one in others if one.level == 1), key=_closest_first)
+    rest = "+".join(name for name in whole.recordings if name not in base.recordings)
+    join = Join(whole.level, base.name, rest, whole.name)
+    groups, joins = [*others, whole], [*joins, join]
+    chain = _chain(groups, joins, _closest_first)
+    return replace(found, groups=tuple(groups), joins=tuple(joins), chain=chain)
 
 
 def _none(best: int) -> str:
@@ -216,17 +231,22 @@ def _place(name: str, candidates: Sequence[str]) -> tuple[int, str]:
     return (candidates.index(name), "") if name in candidates else (-1, name)
 
 
-def _chain(groups: Sequence[Group], joins: Sequence[Join]) -> tuple[str, ...]:
+def _chain(
+    groups: Sequence[Group], joins: Sequence[Join], rank: Callable[[Group], Any]
+) -> tuple[str, ...]:
     """The winner and what it grew from; of several bases always the widest."""
     by_name = {one.name: one for one in groups}
-    winner = min(groups, key=_best_first)
-    if winner.coverage == 0:
+    winner = min(groups, key=rank)
+    if not winner.model_name:
         return ()
-    chain = [winner.name]
-    while by_name[chain[0]].level > 1:
-        bases = [by_name[join.base] for join in joins if join.group == chain[0]]
-        chain.insert(0, min(bases, key=_widest_first).name)
-    return tuple(chain)
+    chain = [winner]
+    while chain[0].level > 1:
+        bases = [by_name[one.base] for one in joins if one.group == chain[0].name]
+        bases = [one for one in bases if one.model_name]
+        if not bases:
+            break
+        chain.insert(0, min(bases, key=_widest_first))
+    return tuple(one.name for one in chain)
 
 
 def _best_first(one: Group) -> tuple[bool, int, float, tuple[int, float]]:
@@ -236,6 +256,12 @@ def _best_first(one: Group) -> tuple[bool, int, float, tuple[int, float]]:
     """
     rmsd = one.unseen_rmsd if np.isfinite(one.unseen_rmsd) else np.inf
     return one.coverage == 0, -one.unseen_coverage, rmsd, _widest_first(one)
+
+
+def _closest_first(one: Group) -> tuple[float, float]:
+    """Order of groups by how far they are off, whatever threshold that is below."""
+    pair = one.unseen_rmsd, one.validation_rmsd
+    return tuple(one if np.isfinite(one) else np.inf for one in pair)  # type: ignore[return-value]
 
 
 def _widest_first(one: Group) -> tuple[int, float]:

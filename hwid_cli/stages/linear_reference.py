@@ -24,6 +24,8 @@ from hwid_cli.tasks.task import Task
 
 # Recordings of a joint fit at most: more change few coefficients hardly.
 _MOST_JOINED = 8
+# Share of its range at which an output has to begin for a level, and over how many samples.
+_LEAST_LEVEL, _FIRST_SAMPLES = 0.5, 5
 # Of models that are as good within this share, the one of the fewest coefficients, [-].
 _AS_GOOD = 0.01
 
@@ -64,9 +66,18 @@ class Roles:
     judging: tuple[str, ...] = ()
 
 
-def linear_options(options: FitOptions) -> FitOptions:
-    """Give the options of a linear model beside a nonlinear one: the same, without maps."""
-    return replace(
+def linear_options(
+    options: FitOptions, recordings: Sequence[Recording] = ()
+) -> FitOptions:
+    """Give the options of a linear model beside a nonlinear one: the same, without maps.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        That it is fitted to. Where their outputs keep a level, as a room's temperature, a
+        straight line at the output adds it: without one an integrator would imitate it.
+    """
+    linear = replace(
         options,
         input_map="none",
         output_map="none",
@@ -74,6 +85,16 @@ def linear_options(options: FitOptions) -> FitOptions:
         output_function=None,
         linear_block=None,
     )
+    if not any(map(_keeps_a_level, recordings)):
+        return linear
+    return replace(linear, output_map="polynomial", degree=1)
+
+
+def _keeps_a_level(recording: Recording) -> bool:
+    """Whether an output begins far from zero."""
+    swing = float(np.ptp(recording.output))
+    first = float(np.mean(recording.output[:_FIRST_SAMPLES]))
+    return abs(first) > _LEAST_LEVEL * swing
 
 
 def linear_fits(
@@ -97,7 +118,7 @@ def linear_fits(
         In the order of ``grid``; one that failed has no model.
     """
     own = tuple(recordings)
-    linear = linear_options(options)
+    linear = linear_options(options, own)
     if len(own) == 1:
         # A rule for joining recordings does nothing to one and is no part of its fit.
         linear = replace(linear, join=FitOptions().join)

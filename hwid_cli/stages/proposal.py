@@ -20,6 +20,7 @@ from hwid_cli.stages.proposed_starts import (
     ALIKE_LEVELS,
     begins_at_rest,
     rest_level,
+    rests_at_operating_points,
     start_of_diagnosis,
     start_of_fits,
     swing_of,
@@ -261,7 +262,8 @@ def _with_common_level(
     """Recipes that leave a level at which all rest, where some kinds would keep it.
 
     A room's temperature, say: subtracted from steps alone, it shifts these against
-    all others. A zero that is another one in each recording is subtracted.
+    all others. So does the level that belongs to an input at which a machine is held.
+    A zero that is another one in each recording is subtracted.
 
     Returns
     -------
@@ -270,17 +272,24 @@ def _with_common_level(
         What stays and why; empty where nothing was to decide.
     """
     own = [raw for raw in raws if "output_offset" in recipes[kinds[raw.name]]]
-    if not own or len(own) == len(raws):
-        return recipes, ""
-    swing = swing_of([raw.output for raw in raws])
-    levels = np.array([rest_level(raw) for raw in own])
-    is_common = np.ptp(levels) <= ALIKE_LEVELS * swing
-    if not is_common or abs(np.mean(levels)) <= ALIKE_LEVELS * swing:
+    if not own:
         return recipes, ""
     kept = {
         kind: tuple(step for step in recipe if step != "output_offset")
         for kind, recipe in recipes.items()
     }
+    if len(own) == len(raws):
+        if not rests_at_operating_points(raws):
+            return recipes, ""
+        return (
+            kept,
+            "; the level at which the output rests goes with the input, and stays",
+        )
+    swing = swing_of([raw.output for raw in raws])
+    levels = np.array([rest_level(raw) for raw in own])
+    is_common = np.ptp(levels) <= ALIKE_LEVELS * swing
+    if not is_common or abs(np.mean(levels)) <= ALIKE_LEVELS * swing:
+        return recipes, ""
     level = f"{np.mean(levels):.3g}{behind(raws[0].output_unit)}"
     return kept, f"; the level at which the output rests, {level}, stays in all of them"
 

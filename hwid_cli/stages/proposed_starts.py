@@ -33,6 +33,17 @@ def rest_level(raw: RawRecording) -> float:
     return _rest_levels(raw)[1]
 
 
+def rests_at_operating_points(raws: Sequence[RawRecording]) -> bool:
+    """Whether recordings rest where an input holds them, and not at a zero of the sensor.
+
+    Equal inputs go with equal outputs there, and an input is not at zero.
+    """
+    inputs = np.array([_rest_levels(raw)[0] for raw in raws])
+    is_held = np.abs(inputs) > ALIKE_LEVELS * swing_of([raw.input for raw in raws])
+    kinds = {raw.name: raw.kind for raw in raws}
+    return bool(is_held.any()) and _rest_where_the_input_says(raws, {}, kinds)
+
+
 def swing_of(signals: Sequence[np.ndarray]) -> float:
     """Median range of signals."""
     return float(np.median([np.nanmax(one) - np.nanmin(one) for one in signals]))

@@ -11,7 +11,7 @@ from hwid_cli import Recording
 from hwid_cli.diagnosis import foreign
 from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.run_starts import Begun, RunStarts
-from hwid_cli.diagnosis.simulator import Runs, Simulator
+from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
 from hwid_cli.diagnosis.standing import as_given, stand_in_for
 from hwid_cli.diagnosis.untold import Untold
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
@@ -235,14 +235,17 @@ def test_a_simulation_is_not_run_with_a_force_that_is_not_finite():
     begun = as_given(
         found, Simulator(able, simulate, {}, FREE, GIVEN), DiagnoseOptions(), Count()
     )
-    runs, signals = Runs(begun.runs.simulator, Count()), begun.problem.signals
+    runs, signals = (
+        Runs(begun.runs.simulator, CountedRuns(Count())),
+        begun.problem.signals,
+    )
     force = [np.full(N, np.nan)] * len(signals)
     assert runs.tried(signals, GIVEN, force) is None
     with pytest.raises(
         SimulationError, match=r"force for recording 'step_1\.5' is not"
     ):
         runs.of(signals, GIVEN, force)
-    assert runs.run_tasks.runs == 0
+    assert runs.run_tasks.count == 0
 
 
 @pytest.mark.thorough
@@ -610,7 +613,7 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
         foreign, "confirm", lambda found, *_: (found, {"c": 1.0}, False)
     )
     simulator = SimpleNamespace(run=simulate)
-    runs = SimpleNamespace(simulator=simulator, run_tasks=None)
+    runs = SimpleNamespace(simulator=simulator, run_tasks=CountedRuns(None))
     foreign._found(
         None, DiagnoseOptions(max_effects=3), (runs, {"c": 1.0}),
         lambda *_: None, None, is_first=False,
@@ -633,7 +636,7 @@ def test_a_trial_without_an_answer_ends_no_search_for_the_parameters():
         recordings(), SimulationOptions(hold="linear"), DiagnoseOptions(), ()
     )
     able = Capabilities(run=True, parameters=True)
-    runs = Runs(Simulator(able, fragile, {}, FREE, GIVEN), Count())
+    runs = Runs(Simulator(able, fragile, {}, FREE, GIVEN), CountedRuns(Count()))
     found = foreign.fit_parameters(runs.tried, of.signals, FREE, GIVEN)
     assert refused
     assert 8.0 <= found["kt"] <= 8.3
@@ -691,7 +694,7 @@ def test_a_law_takes_the_place_of_a_name_that_leaves_far_more(
     # 1.12 times the noise, and 1.02 with the law.
     named = made_up(("quadratic_drag",), 125.0)
     told = foreign._law_instead(
-        SimpleNamespace(of=lambda *_: [], run_tasks=None),
+        SimpleNamespace(of=lambda *_: [], run_tasks=CountedRuns(None)),
         SimpleNamespace(signals=()),
         DiagnosisVerdict("named", case["is_complete"], named, ()),
         {"kt": 1.0},
@@ -722,7 +725,7 @@ def test_forces_in_the_place_of_parameters_are_told(
     simulator = Simulator(able, simulate, {}, FREE if is_free else {}, GIVEN)
     begun = Begun(
         SimpleNamespace(unit="mm"),
-        Runs(simulator, Count()),
+        Runs(simulator, CountedRuns(Count())),
         (),
         RunStarts({"step": 1.5}),
     )
@@ -755,3 +758,21 @@ def test_parameters_have_intervals_where_nothing_acts_beside_them(
     if is_told:
         ends = found.base[0].low, found.base[0].high
         assert ends == pytest.approx((10 * np.exp(-0.0196), 10 * np.exp(0.0196)))
+
+
+@pytest.mark.thorough
+def test_after_the_runs_that_are_allowed_the_answer_is_the_best_until_then():
+    able = Capabilities(run=True, parameters=True, force=True)
+    hidden = Hidden("both", (), dry=2.0, force=lambda x, v, t: -1.5e6 * x**3)
+    counts, named = [], []
+    for most in (1, 2000):
+        run = Count()
+        found = diagnose_foreign(
+            recordings(hidden), Simulator(able, simulate, {}, FREE, GIVEN),
+            DiagnoseOptions(effects=FEW, max_runs=most), run, lambda what, total: None,
+        )  # fmt: skip
+        counts.append(run.runs)
+        named.append([one.id for one in found.effects])
+    # The effect that has begun is tried to its end; a second one is not looked for.
+    assert counts[0] < counts[1]
+    assert len(named[0]) < len(named[1]) == 2

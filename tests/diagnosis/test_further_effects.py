@@ -76,9 +76,19 @@ def test_one_effect_stays_alone_where_no_second_may_be_asked_for(
     one = SimpleNamespace(verdict=SimpleNamespace(chosen=chosen))
     first = ToldByRuns(one, {}, is_all=False)
     options = DiagnoseOptions(max_effects=most)
-    assert with_further_effect(first, None, options, None) is first
+    runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
+    assert with_further_effect(first, runs, options, None) is first
     nothing = ToldByRuns(None, {}, is_all=False)
     assert with_further_effect(nothing, None, options, None) is nothing
+
+
+def test_no_second_effect_is_asked_for_once_the_runs_are_spent(monkeypatch):
+    monkeypatch.setattr(further_effects, "find", None)
+    chosen = made_up(("coulomb_friction",), 1.0, parameters=1)
+    one = SimpleNamespace(verdict=SimpleNamespace(chosen=chosen))
+    first = ToldByRuns(one, {}, is_all=False)
+    runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=True))
+    assert with_further_effect(first, runs, DiagnoseOptions(), None) is first
 
 
 @pytest.mark.parametrize(("left", "is_pair"), [(109.0, False), (100.0, True)])

@@ -24,7 +24,9 @@ def left(sse):
 def settle(monkeypatch):
     """Best run where each way leaves a given sum of squares; the stand-in said 100."""
 
-    def of(*, held, beside, free, beside_free, ran_away=False):
+    def of(
+        *, held, beside, free, beside_free, ran_away=False, rival=np.inf, spent=False
+    ):
         asked = []
 
         def best_turn(_findings, turn, _runs):
@@ -36,7 +38,7 @@ def settle(monkeypatch):
             run = (turn.fit, {"way": way})
             is_lost = ran_away and way == "held"
             return Turn(turn.problem, turn.fit, {"way": way}, 100.0, at_force=True,
-                        tried=run, left=left(sse), ran_away=is_lost)  # fmt: skip
+                        rival=turn.rival, tried=run, left=left(sse), ran_away=is_lost)  # fmt: skip
 
         def beside_effect(_findings, turn, _runs):
             way = "beside free" if turn.values.get("way") == "free" else "beside held"
@@ -48,7 +50,9 @@ def settle(monkeypatch):
         simulator = SimpleNamespace(free={"c": None}, capabilities=able)
         findings = SimpleNamespace(problem=problem(recordings()), base=base(1e5))
         fit = made_up((FRICTION,), 100.0 / 6)
-        best = settled(findings, fit, SimpleNamespace(simulator=simulator), {})
+        counted = SimpleNamespace(are_spent=spent)
+        runs = SimpleNamespace(simulator=simulator, run_tasks=counted)
+        best = settled(findings, fit, runs, {}, rival)
         return best.values_of_run["way"], asked
 
     return of
@@ -62,6 +66,17 @@ def test_a_run_as_good_as_the_stand_in_is_enough(settle):
 def test_parameters_are_fitted_beside_the_effect_before_forces_take_their_place(settle):
     best, asked = settle(held=900.0, beside=110.0, free=1.0, beside_free=1.0)
     assert (best, asked) == ("beside held", ["held", "beside held"])
+
+
+def test_no_other_way_is_tried_with_what_leaves_far_more_than_another_effect(settle):
+    args = {"held": 900.0, "beside": 110.0, "free": 1.0, "beside_free": 1.0}
+    assert settle(**args, rival=290.0) == ("held", ["held"])
+    assert settle(**args, rival=310.0)[1] == ["held", "beside held"]
+
+
+def test_nor_once_the_runs_are_spent(settle):
+    args = {"held": 900.0, "beside": 110.0, "free": 1.0, "beside_free": 1.0}
+    assert settle(**args, spent=True) == ("held", ["held"])
 
 
 def test_and_again_where_forces_know_the_effect_better(settle):

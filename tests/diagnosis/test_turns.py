@@ -8,7 +8,7 @@ import pytest
 
 from hwid_cli.diagnosis import turns
 from hwid_cli.diagnosis.turns import Turn, best_turn
-from tests.diagnosis.made_up_fits import made_up
+from tests.diagnosis.made_up_fits import base, made_up
 from tests.diagnosis.small_drive import problem, recordings
 
 FIT = made_up(("coulomb_friction",), 100.0)
@@ -18,22 +18,23 @@ FIT = made_up(("coulomb_friction",), 100.0)
 def taken(monkeypatch):
     """Turns that are taken, of those that would leave given sums of squares."""
 
-    def of(sums, *, agrees):
+    def of(sums, *, agrees, without=1e9, rival=np.inf):
         left = iter(sums)
         seen = []
 
         def following(_findings, turn, _runs):
             sse = next(left)
             seen.append(sse)
-            return Turn(turn.problem, FIT, {}, 100.0, at_force=True, tried=(FIT, {}),
-                        left=(np.array([np.sqrt(sse)]),))  # fmt: skip
+            return Turn(turn.problem, FIT, {}, 100.0, at_force=True, rival=rival,
+                        tried=(FIT, {}), left=(np.array([np.sqrt(sse)]),))  # fmt: skip
 
         monkeypatch.setattr(turns, "_next_turn", following)
         monkeypatch.setattr(turns, "_agrees", lambda *_: agrees)
         monkeypatch.setattr(turns, "fit_of_run", lambda *_: FIT)
         criteria = SimpleNamespace(is_complete=lambda _: False)
-        first = Turn(None, FIT, {}, 100.0, at_force=True)
-        best = best_turn(SimpleNamespace(criteria=criteria), first, None)
+        first = Turn(None, FIT, {}, 100.0, at_force=True, rival=rival)
+        findings = SimpleNamespace(criteria=criteria, base=base(without / 6))
+        best = best_turn(findings, first, None)
         return len(seen), float(best.sse.sum())
 
     return of
@@ -90,3 +91,17 @@ def test_a_force_that_the_drive_has_already_acts_at_the_force_input(
     runs = SimpleNamespace(simulator=able)
     fit = made_up((effect,), 1.0)
     assert turns.acts_at_force(replace(of, drive=drive), fit, runs) is is_force
+
+
+def test_no_turn_follows_one_that_leaves_far_more_than_no_effect(taken):
+    # Ten times as much as without it; just less goes on until nothing is gained.
+    assert taken([1100.0, 50.0], agrees=False, without=100.0)[0] == 1
+    count, _ = taken([900.0, 50.0, *[49.0] * 20], agrees=False, without=100.0)
+    assert count > 2
+
+
+def test_three_turns_are_enough_where_another_effect_leaves_far_less(taken):
+    falls = falling(100.0, 0.9)
+    assert taken(falls, agrees=False, rival=20.0)[0] == 3
+    # Within its reach it goes on.
+    assert taken(falls, agrees=False, rival=30.0)[0] == 16

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from hwid_cli import FitOptions, Orders, Recording, fit, rmsd
-from hwid_cli.model.simulate import validation_output
+from hwid_cli.model.simulate import simulate, validation_output
 from hwid_cli.stages.linear_reference import Roles, linear_fits, linear_reference
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings, TaskDone, run_tasks
@@ -170,3 +170,27 @@ def test_the_ratio_is_over_all_recordings_but_those_of_the_fit(recordings):
     expected = np.exp(np.mean(np.log(errors[0]) - np.log(errors[1])))
     assert expected < 0.9
     assert found.ratio == pytest.approx(expected)
+
+
+def lag_with_level(name, seed, level):
+    """A lag whose output stands at a level of its own, as a room's temperature."""
+    rng = np.random.default_rng(seed)
+    current = np.repeat(rng.uniform(0, 1, 40), 15)
+    output = level + lfilter([0.0, 0.1], [1.0, -0.9], current)
+    return Recording(name, current, output + 1e-3 * rng.standard_normal(600), 1e-3)
+
+
+def test_a_level_of_the_output_is_no_dynamics():
+    own = [lag_with_level(name, seed, 20.0) for seed, name in enumerate("ab")]
+    options = replace(OPTIONS, join="experiments")
+    (found,) = linear_fits(own, [Orders(1, 1, 1)], options, run_here)
+    assert found.rmsd == pytest.approx(1e-3, rel=0.1)
+    np.testing.assert_allclose(np.roots(found.model.denominator), 0.9, atol=0.01)
+    held = simulate(found.model, np.full(900, 0.5), initial_state="steady")
+    np.testing.assert_allclose(held, 20.0 + 0.5, atol=0.01)
+
+
+def test_no_level_is_given_where_outputs_begin_at_zero():
+    own = [lag_with_level(name, seed, 0.0) for seed, name in enumerate("ab")]
+    (found,) = linear_fits(own, [Orders(1, 1, 1)], OPTIONS, run_here)
+    assert not found.options.has_maps

@@ -79,3 +79,30 @@ def test_parts_of_one_recording_begin_in_mid_motion():
     ]
     only = RawRecording("a", u, lfilter([0.0, 0.1], [1.0, -0.95], u), 1e-3)
     assert start(only)[0] == "estimated"
+
+
+def recipe(*raws):
+    return propose(raws).recipes["step"]
+
+
+@pytest.mark.parametrize(
+    ("before", "offset", "steps"),
+    [
+        # Held at other inputs, the output is where these hold it.
+        ((1.0, 2.0), (0.0, 0.0), ("cut",)),
+        # All at one input that is not zero: the level belongs to it.
+        ((1.0, 1.0), (20.0, 20.0), ("cut",)),
+        # A zero of the sensor, and a drive that rests anywhere.
+        ((0.0, 0.0), (20.0, 20.0), ("cut", "output_offset")),
+        ((0.0, 0.0), (0.8, 0.0), ("cut", "output_offset")),
+        ((1.0, 1.0), (0.8, 0.0), ("cut", "output_offset")),
+    ],
+)
+def test_a_level_that_goes_with_the_input_is_not_subtracted(before, offset, steps):
+    raws = [
+        settled(f"step_{name}", height, before=level, offset=shift, seed=seed)
+        for seed, (name, height, level, shift) in enumerate(
+            zip("ab", (3.0, 0.5), before, offset, strict=True)
+        )
+    ]
+    assert recipe(*raws) == steps

@@ -1,0 +1,198 @@
+"""One model of all recordings, on plants whose laws are written here."""
+
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+import pytest
+
+from hwid_cli.model.fit import fit
+from hwid_cli.model.simulate import simulate
+from hwid_cli.records.experiment import GroupOptions, OrdersOptions
+from hwid_cli.records.groups import Group, Join
+from hwid_cli.records.model import FitOptions, Orders
+from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.group_levels import GroupPlan, search_all
+from hwid_cli.stages.group_search import Found, with_whole
+from hwid_cli.stages.together import (
+    Candidate,
+    fit_together,
+    folds_of,
+    kinds_tried,
+    with_units,
+)
+from hwid_cli.tasks.cache import MemoryStore
+from hwid_cli.tasks.runner import RunSettings, run_tasks
+
+GRID = OrdersOptions(nb=(1,), nk=(1, 2))
+OPTIONS = FitOptions(
+    units=6, initial_state="steady", join="experiments", starts=1, max_iterations=20
+)
+N = 300
+
+
+def tank(u):
+    """Level of a tank behind a pump: the outflow goes with the root of the level."""
+    y, level = np.zeros(u.size), u[0] ** 2
+    for k, pumped in enumerate(u):
+        y[k] = level
+        level += 0.05 * (pumped - np.sqrt(max(level, 0.0)))
+    return y
+
+
+def step(name, before, after, seed=0):
+    u = np.where(np.arange(N) < 20, before, after)
+    noise = 0.01 * np.random.default_rng(seed).standard_normal(N)
+    return Recording(name, u, tank(u) + noise, 1.0)
+
+
+STEPS = (
+    step("a", 1.0, 2.0, 1),
+    step("b", 2.0, 1.2, 2),
+    step("c", 1.5, 2.6, 3),
+    step("d", 2.2, 1.6, 4),
+)
+
+
+class Count:
+    def __init__(self):
+        self.tasks = []
+
+    def __call__(self, total, work):
+        def execute(tasks):
+            assert len(tasks) == total
+            self.tasks += tasks
+            return run_tasks(tasks, RunSettings(MemoryStore()))
+
+        return work(execute)
+
+
+@pytest.fixture(scope="module")
+def found():
+    count = Count()
+    return fit_together(STEPS, GRID, OPTIONS, count), count.tasks
+
+
+@pytest.mark.thorough
+def test_it_is_closer_to_new_inputs_than_any_model_of_one_recording(found):
+    new = 1.8 + 0.6 * np.sin(2 * np.pi * np.arange(600) / 150)
+    true = tank(new)
+
+    def off(found):
+        return np.std(simulate(found.model, new, initial_state="steady") - true)
+
+    together, _ = found
+    assert together.fit.identified_on == ("a", "b", "c", "d")
+    single = [fit([one], Orders(1, 2, 1), OPTIONS) for one in STEPS]
+    assert off(together.fit) < 0.5 * min(off(one) for one in single)
+    assert together.fit.uncertainty is not None
+
+
+@pytest.mark.thorough
+def test_what_chooses_was_in_no_fit(found):
+    """Each fold is a fit of the others; only the last fit is one of all."""
+    together, tasks = found
+    names = [tuple(one.name for one in task.arguments[0]) for task in tasks]
+    assert names[-1] == ("a", "b", "c", "d")
+    left_out = [set("abcd") - set(one) for one in names[:-1]]
+    assert all(len(one) == 1 for one in left_out)
+    per_candidate = [
+        sorted(map(min, left_out[n : n + 4])) for n in range(0, len(left_out), 4)
+    ]
+    assert per_candidate == [list("abcd")] * len(per_candidate)
+    assert len({task.key for task in tasks}) == len(tasks) == together.n_models
+
+
+@pytest.mark.thorough
+def test_maps_are_chosen_that_go_on_between_the_levels(found):
+    """Of six units on either side, steps between few levels tell three on one side."""
+    together, _ = found
+    own = together.fit.options
+    assert (own.input_map, own.output_map).count("none") == 1
+    used = own.of_output if own.input_map == "none" else own.of_input
+    assert used.units <= 5
+
+
+def test_folds_hold_each_recording_once():
+    for n in (2, 5, 6, 23):
+        folds = folds_of(n)
+        assert len(folds) == min(n, 5)
+        assert sorted(chain.from_iterable(folds)) == list(range(n))
+
+
+def test_units_are_of_maps_that_have_them():
+    options = FitOptions(units=10, input_map="saturation", output_map="cubic_spline")
+    assert with_units(options, 3).of_output.units == 3
+    assert with_units(options, 99).of_output.units == 10
+    assert (
+        with_units(options, 3).of_input.units == with_units(options, 5).of_input.units
+    )
+    maps = [(one.input_map, one.output_map) for one in kinds_tried(options)]
+    assert maps == [
+        ("saturation", "cubic_spline"), ("saturation", "none"), ("none", "cubic_spline"),
+    ]  # fmt: skip
+    assert kinds_tried(replace(options, input_map="none")) == (
+        replace(options, input_map="none"),
+    )
+
+
+def test_smaller_orders_come_before_smaller_maps():
+    small, large = Orders(1, 2, 1), Orders(2, 3, 1)
+    few = with_units(OPTIONS, 3)
+    sizes = [
+        Candidate(few, 1, 2, small).size,
+        Candidate(OPTIONS, 1, 2, small).size,
+        Candidate(few, 2, 3, large).size,
+    ]
+    assert sizes == sorted(sizes)
+    assert len(set(sizes)) == 3
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("threshold", [1e-6, 0.5])
+def test_the_group_of_all_wins_whatever_its_threshold_says(threshold):
+    names = tuple(one.name for one in STEPS)
+    plan = GroupPlan(
+        STEPS, None, names, names, GRID, OPTIONS,
+        GroupOptions(max_level=1, together=True), threshold,
+    )  # fmt: skip
+    done = []
+
+    def run(_level, _unit, _total, work):
+        def execute(tasks):
+            done.extend(tasks)
+            return run_tasks(tasks, RunSettings(MemoryStore()))
+
+        return work(execute)
+
+    search = search_all(plan, run)
+    winner = search.chain_groups[-1]
+    assert winner.recordings == names
+    assert winner.coverage == (0 if threshold < 1e-3 else 4)
+    fit = search.fits[[one.name for one in search.groups].index(winner.name)]
+    assert (winner.nb, winner.nk) == (fit.orders.nb, fit.orders.nf)
+    row = search.rmsd[[one.name for one in search.groups].index(winner.name)]
+    assert winner.validation_rmsd == pytest.approx(np.sqrt(np.mean(row**2)))
+    # A recording alone that is below no threshold is no model that it grew from.
+    assert len(search.chain) == (1 if threshold < 1e-3 else 2)
+    search.check_stored()
+    without = replace(plan, options=GroupOptions(max_level=1))
+    assert search_all(without, run).chain != search.chain
+
+
+def group(names, rmsd, nb=1):
+    return Group(tuple(names), 1, nb, 1, 0.0, rmsd, 1, 1, 1, False)
+
+
+def test_a_group_of_all_that_had_grown_gives_way():
+    singles = [group("a", 3.0), group("b", 2.0)]
+    joins = [Join(1, "a", "", "a"), Join(1, "b", "", "b"), Join(2, "a", "b", "a+b")]
+    grown = Found((*singles, group("ab", 9.0)), tuple(joins), ("a",), "")
+    whole = with_whole(grown, group("ab", 1.0))
+    assert [one.validation_rmsd for one in whole.groups] == [3.0, 2.0, 1.0]
+    assert [one.group for one in whole.joins] == ["a", "b", "a+b"]
+    assert whole.joins[-1] == Join(2, "b", "a", "a+b")
+    assert whole.chain == ("b", "a+b")
+    # One that is farther off is not taken.
+    assert with_whole(grown, group("ab", 2.5)).chain == ("b",)
+    assert with_whole(grown, group("ab", float("nan"), nb=0)).chain == ("b",)
