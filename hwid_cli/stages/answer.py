@@ -86,11 +86,7 @@ def model_answer(
         threshold=_threshold(crossval or final),
         advice=advice,
         maps=maps,
-        has_these_maps=(
-            maps is None
-            or _has_maps(found, maps)
-            or bool(own_maps(found, fits.values()))
-        ),
+        has_these_maps=bool(own_maps(found, fits.values())) or _has_maps(found, maps),
         noise_rms=differences_rms([one.output for one in unseen], 0.0) or np.nan,
     )
     name = _at(advice, found, named, stored.nk_role)
@@ -121,8 +117,10 @@ def _maps(stored: StoredResults, advice: OrderChoice | None) -> ChosenMaps | Non
     return maps
 
 
-def _has_maps(found: Fit, maps: ChosenMaps) -> bool:
-    """Whether a fit has maps of these kinds and sizes."""
+def _has_maps(found: Fit, maps: ChosenMaps | None) -> bool:
+    """Whether a fit has maps of these kinds and sizes, if any are recommended."""
+    if maps is None:
+        return True
     own = found.options.of_input, found.options.of_output
     wanted = (
         (maps.input_map, maps.input_units),

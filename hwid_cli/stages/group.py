@@ -24,13 +24,16 @@ from hwid_cli.stages.fit_seconds import (
     PAIR_BYTES,
     SECONDS_PER_SIMULATED_SAMPLE,
     TASK_SECONDS,
+    fit_seconds,
     group_grid_seconds,
+    middle_orders,
 )
 from hwid_cli.stages.group_levels import NAME, STAGE_VERSION, GroupPlan, search_all
 from hwid_cli.stages.identify import Run
 from hwid_cli.stages.order_grid import candidate_orders
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.stages.together import FEW_UNITS, most_fits
 from hwid_cli.store.group_results import read_group, write_group, write_groups_csv
 from hwid_cli.tasks.cache import Store, recording_key, task_key
 from hwid_cli.tasks.runner import TaskDone, run_tasks
@@ -188,34 +191,65 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     )
     n = int(np.median([one.n_samples for one in usable] or [0]))
     n_orders = len(candidate_orders(experiment.orders))
-    sizes = [*enumerate(bounds, start=2)]
-    if options.together and n_candidates > max((size for size, _ in sizes), default=1):
-        sizes.append((n_candidates, 1))
-    n_groups = sum(count for _, count in sizes)
-    fits = n_groups * n_orders
-    of_levels = [
-        count
-        * (
-            group_grid_seconds(planning.cost, n, experiment, level)
-            + SECONDS_PER_SIMULATED_SAMPLE * n * n_validate * n_orders
-            + TASK_SECONDS * (n_orders + n_validate)
-        )
-        / planning.workers
-        for level, count in sizes
-    ]
+    of_levels = _seconds_of_levels(planning, n, n_validate, bounds)
+    fits = sum(bounds) * n_orders
+    what = f"at most {sum(bounds)} groups ({' + '.join(map(str, bounds))}), {fits} fits"
+    together = _seconds_together(planning, n, n_candidates)
+    if together is not None:
+        more, seconds = together
+        what = f"one group of all, at most {more} fits" + (f"; {what}" if fits else "")
+    else:
+        more, seconds = 0, 0.0
     plan = StagePlan(
         NAME,
-        f"at most {n_groups} groups ({' + '.join(str(count) for _, count in sizes)}), "
-        f"{fits} fits",
-        fits,
+        what,
+        fits + more,
         None,
-        sum(of_levels[:1]),
-        FIT_BYTES * fits + PAIR_BYTES * n_groups * n_validate,
-        sum(of_levels),
-        "the search goes on to the last level",
+        sum(of_levels[:1]) + seconds,
+        FIT_BYTES * (fits + more) + PAIR_BYTES * sum(bounds) * n_validate,
+        sum(of_levels) + seconds,
+        "the search goes on to the last level" if fits else "",
         is_shared=True,
     )
     return (plan,)
+
+
+def _seconds_of_levels(
+    planning: Planning, n_samples: int, n_validate: int, bounds: Sequence[int]
+) -> list[float]:
+    """Time of the groups of each level that grow by one recording."""
+    n_orders = len(candidate_orders(planning.experiment.orders))
+    validating = SECONDS_PER_SIMULATED_SAMPLE * n_samples * n_validate * n_orders
+    starting = TASK_SECONDS * (n_orders + n_validate)
+    return [
+        count
+        * (
+            group_grid_seconds(planning.cost, n_samples, planning.experiment, level)
+            + validating
+            + starting
+        )
+        / planning.workers
+        for level, count in enumerate(bounds, start=2)
+    ]
+
+
+def _seconds_together(
+    planning: Planning, n_samples: int, n_candidates: int
+) -> tuple[int, float] | None:
+    """Number of fits of the group of all and their time; None where none is asked for."""
+    experiment = planning.experiment
+    if not (experiment.group or GroupOptions()).together or n_candidates < 2:
+        return None
+    orders = candidate_orders(experiment.orders)
+    count = most_fits(experiment.fit, n_candidates, len(orders))
+    each = fit_seconds(
+        planning.cost,
+        middle_orders(experiment.orders),
+        n_samples,
+        units=min(experiment.fit.units, FEW_UNITS),
+        n_recordings=n_candidates - 1,
+    )
+    return count, count * (each + TASK_SECONDS) / planning.workers
 
 
 STAGE = Stage(

@@ -35,13 +35,16 @@ RunRound = Callable[[int, Callable[[Run], Any]], Any]
 MOST_FOLDS = 5
 # Units with which kinds of maps are compared, and of the best one those that are tried
 # before all that the configuration gives: few go on more plainly where no sample lies.
-_FEWEST_UNITS, _FEW_UNITS, _MOST_UNITS = 3, 5, 1000
+_FEWEST_UNITS, FEW_UNITS, _MOST_UNITS = 3, 5, 1000
 # Share of a recording whose samples tell where a model starts that has a fitted start.
 _START_SHARE = 0.2
 # Numerator coefficients and poles: of a mass on a spring, and with a lag before it.
 _USUAL = ((1, 2), (2, 3))
 # Of candidates that are as close within this share the smallest is taken, [-].
 _AS_CLOSE = 0.02
+# By how much a model has to come closer that remembers its start for longer than recordings
+# last, [-]: no new recording tells such a start, unless the machine itself is like that.
+_WORTH_LASTING = 1.5
 # How far off counts at most, over the standard deviation of the output, [-]: a model that
 # is worse than a constant is no worse for being far worse.
 _FARTHEST = 3.0
@@ -151,6 +154,19 @@ def folds_of(n: int) -> list[list[int]]:
     return [list(range(first, n, count)) for first in range(count)]
 
 
+def most_fits(options: FitOptions, n_recordings: int, n_orders: int) -> int:
+    """Number of fits that the model of all takes at most.
+
+    Examples
+    --------
+    >>> most_fits(FitOptions(), n_recordings=4, n_orders=12)
+    77
+    """
+    candidates = len(_USUAL) * len(kinds_tried(options)) + 2 + n_orders
+    # The best maps were fitted at one pair of orders before.
+    return (candidates - 1) * len(folds_of(n_recordings)) + 1
+
+
 def fit_together(
     recordings: Sequence[Recording],
     grid: OrdersOptions,
@@ -177,7 +193,7 @@ def fit_together(
         for one in kinds_tried(options)
         if with_units(one, _FEWEST_UNITS) == best.options
     )
-    more = [with_units(of_kind, n) for n in (_FEWEST_UNITS, _FEW_UNITS, _MOST_UNITS)]
+    more = [with_units(of_kind, n) for n in (_FEWEST_UNITS, FEW_UNITS, _MOST_UNITS)]
     best = folds.best_of([replace(best, options=one) for one in dict.fromkeys(more)])
     chosen = folds.best_of([Candidate(best.options, *at) for at in orders])
     whole = folds.whole(chosen)
@@ -209,19 +225,26 @@ class _Folds:
         self._contents = [recording_key(one) for one in recordings]
         self._out = folds_of(len(recordings))
         self._known: dict[Candidate, float] = {}
+        self._lasting: set[Candidate] = set()
         self.n_fits = 0
 
     def best_of(self, candidates: Sequence[Candidate]) -> Candidate:
         """The smallest of those that are nearly as close as the closest one."""
         new = [one for one in candidates if one not in self._known]
         tasks = [self._task(one, left_out) for one in new for left_out in self._out]
-        fits = iter(self._fits(tasks))
+        found = iter(self._fits(tasks))
         for one in new:
-            self._known[one] = self._off([next(fits) for _ in self._out])
-        least = min(self._known[one] for one in candidates)
-        near = [
-            one for one in candidates if self._known[one] <= least + np.log1p(_AS_CLOSE)
-        ]
+            fits = [next(found) for _ in self._out]
+            self._known[one] = self._off(fits)
+            if any(map(self._outlasts, fits)):
+                self._lasting.add(one)
+        pool = list(candidates)
+        least = min(self._known[one] for one in pool)
+        settling = [one for one in pool if one not in self._lasting]
+        nearest = min((self._known[one] for one in settling), default=np.inf)
+        if nearest <= least + np.log(_WORTH_LASTING):
+            pool, least = settling, nearest
+        near = [one for one in pool if self._known[one] <= least + np.log1p(_AS_CLOSE)]
         return min(near, key=lambda one: (one.size, self._known[one]))
 
     def whole(self, candidate: Candidate) -> Fit:
@@ -245,6 +268,14 @@ class _Folds:
             for one in (self._recordings[place] for place in left_out):
                 logs.append(np.log(_share_off(found, one)))
         return float(np.mean(logs))
+
+    def _outlasts(self, found: Fit) -> bool:
+        """Whether a model remembers where it started for longer than recordings last."""
+        if found.model is None:
+            return False
+        longest = max(one.n_samples for one in self._recordings)
+        radius = np.abs(np.roots(found.model.denominator)).max(initial=0.0)
+        return bool(radius > 1.0 - 0.5 / longest)
 
     def _task(self, candidate: Candidate, left_out: Sequence[int]) -> Task:
         """A fit of all recordings but some."""

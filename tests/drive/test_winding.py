@@ -1,9 +1,13 @@
 """The circuit with an inductance against the matrix exponential and scipy's solver."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
-from scipy import signal
+from scipy import integrate, signal
 
+from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.records.drive import Drive
 from tests.drive.drive_cases import (
     CORNER_TIMES_S,
     CORNERS,
@@ -75,3 +79,75 @@ def test_a_step_of_voltage_at_a_blocked_drive_charges_the_coil(time):
     stuck = {"coulomb_friction": {"force_N": 1e3}}
     moved = tool(INDUCTANCE | stuck, np.full(50, 2.0), sample_time=time, **CIRCUIT)
     assert np.all(moved.output == moved.output[0])
+
+
+def followed_by_scipy(voltage, step, circuit, further, hold):
+    """Positions of a mass behind a fast coil with a curved force, from sample to sample."""
+    mass, damping, stiffness, gain, resistance, inductance = circuit
+    state, positions = np.zeros(3), [0.0]
+    for first, last in pairwise(voltage):
+        end = last if hold == "linear" else first
+
+        def rates(t, now, first=first, end=end):
+            x, v, i = now
+            u = first + (end - first) * t / step
+            force = gain * i - damping * v - stiffness * x + further(x, v)
+            drop = resistance * i + gain * v
+            return [v, force / mass, (u - drop) / inductance]
+
+        found = integrate.solve_ivp(
+            rates, (0, step), state, method="Radau", rtol=1e-9, atol=1e-12
+        )
+        state = found.y[:, -1]
+        positions.append(state[0])
+    return np.array(positions)
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero"])
+@pytest.mark.parametrize(
+    ("effects", "further"),
+    [
+        (
+            {"cubic_stiffness": {"stiffness_N_per_m3": 4e7}},
+            lambda x, v: -4e7 * x**3,
+        ),
+        (
+            {"quadratic_drag": {"drag_N_s2_per_m2": 6.0}},
+            lambda x, v: -6.0 * v * abs(v),
+        ),
+    ],
+)
+def test_curved_forces_behind_a_coil_much_faster_than_a_sample(effects, further, hold):
+    """A loudspeaker: its coil settles in 60 us, a sample is 500 us long."""
+    mass, damping, stiffness, gain, resistance, inductance = circuit = (
+        0.028, 1.6, 2200.0, 8.2, 5.6, 3.5e-4,
+    )  # fmt: skip
+    voltage = np.repeat(np.random.default_rng(4).uniform(-12, 12, 8), 10)
+    voltage[:3] = 0.0
+    drive = Drive(
+        mass_kg=mass,
+        damping_N_s_per_m=damping,
+        stiffness_N_per_m=stiffness,
+        force_constant_N_per_A=gain,
+        resistance_ohm=resistance,
+        inductance_H=inductance,
+        effects=effects,
+        hold=hold,
+    )
+    found = simulate_drive(voltage, drive, sample_time_s=5e-4).position
+    expected = followed_by_scipy(voltage, 5e-4, circuit, further, hold)
+    assert np.abs(found - expected).max() < 1e-5 * np.ptp(expected)
+
+
+def test_a_drive_at_rest_behind_a_coil_lets_go_when_the_current_is_there():
+    """With a curved spring, as without: the coil charges while friction holds."""
+    held = {"coulomb_friction": {"force_N": 3.0}}
+    curved = held | {"cubic_stiffness": {"stiffness_N_per_m3": 1e-9}}
+    voltage = np.where(np.arange(400) < 20, 0.0, 2.0)
+    plain, with_curve = (
+        tool(INDUCTANCE | one, voltage, **CIRCUIT) for one in (held, curved)
+    )
+    moves = np.flatnonzero(plain.position)[0]
+    assert moves > 20
+    assert np.flatnonzero(with_curve.position)[0] == moves
+    assert rms(plain.position - with_curve.position) < 1e-6 * np.ptp(plain.position)

@@ -2,9 +2,11 @@
 
 from dataclasses import replace
 from itertools import chain
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from hwid_cli.model.fit import fit
 from hwid_cli.model.simulate import simulate
@@ -12,6 +14,7 @@ from hwid_cli.records.experiment import GroupOptions, OrdersOptions
 from hwid_cli.records.groups import Group, Join
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
+from hwid_cli.stages import together
 from hwid_cli.stages.group_levels import GroupPlan, search_all
 from hwid_cli.stages.group_search import Found, with_whole
 from hwid_cli.stages.together import (
@@ -81,17 +84,17 @@ def test_it_is_closer_to_new_inputs_than_any_model_of_one_recording(found):
     def off(found):
         return np.std(simulate(found.model, new, initial_state="steady") - true)
 
-    together, _ = found
-    assert together.fit.identified_on == ("a", "b", "c", "d")
+    model, _ = found
+    assert model.fit.identified_on == ("a", "b", "c", "d")
     single = [fit([one], Orders(1, 2, 1), OPTIONS) for one in STEPS]
-    assert off(together.fit) < 0.5 * min(off(one) for one in single)
-    assert together.fit.uncertainty is not None
+    assert off(model.fit) < 0.5 * min(off(one) for one in single)
+    assert model.fit.uncertainty is not None
 
 
 @pytest.mark.thorough
 def test_what_chooses_was_in_no_fit(found):
     """Each fold is a fit of the others; only the last fit is one of all."""
-    together, tasks = found
+    model, tasks = found
     names = [tuple(one.name for one in task.arguments[0]) for task in tasks]
     assert names[-1] == ("a", "b", "c", "d")
     left_out = [set("abcd") - set(one) for one in names[:-1]]
@@ -100,14 +103,14 @@ def test_what_chooses_was_in_no_fit(found):
         sorted(map(min, left_out[n : n + 4])) for n in range(0, len(left_out), 4)
     ]
     assert per_candidate == [list("abcd")] * len(per_candidate)
-    assert len({task.key for task in tasks}) == len(tasks) == together.n_models
+    assert len({task.key for task in tasks}) == len(tasks) == model.n_models
 
 
 @pytest.mark.thorough
 def test_maps_are_chosen_that_go_on_between_the_levels(found):
     """Of six units on either side, steps between few levels tell three on one side."""
-    together, _ = found
-    own = together.fit.options
+    model, _ = found
+    own = model.fit.options
     assert (own.input_map, own.output_map).count("none") == 1
     used = own.of_output if own.input_map == "none" else own.of_input
     assert used.units <= 5
@@ -196,3 +199,51 @@ def test_a_group_of_all_that_had_grown_gives_way():
     # One that is farther off is not taken.
     assert with_whole(grown, group("ab", 2.5)).chain == ("b",)
     assert with_whole(grown, group("ab", float("nan"), nb=0)).chain == ("b",)
+
+
+@pytest.mark.parametrize(
+    ("off", "is_taken"),
+    [
+        # A pole that outlasts the recordings has to come half as near again.
+        (1.4, False),
+        (1.6, True),
+    ],
+)
+def test_a_model_that_never_forgets_its_start_has_to_be_worth_it(
+    monkeypatch, off, is_taken
+):
+    settles, lasts = (Candidate(OPTIONS, 1, n, Orders(1, n, 1)) for n in (1, 2))
+    poles = {1: 0.9, 2: 1.0 - 0.4 / N}
+
+    def fits(_self, tasks):
+        return [
+            SimpleNamespace(
+                model=SimpleNamespace(
+                    denominator=np.array([1.0, -poles[task.arguments[1].nf]])
+                )
+            )
+            for task in tasks
+        ]
+
+    def share_off(found, _recording):
+        return 0.1 * off if found.model.denominator[1] == -0.9 else 0.1
+
+    monkeypatch.setattr(together._Folds, "_fits", fits)
+    monkeypatch.setattr(together, "_share_off", share_off)
+    best = together._Folds(STEPS, None).best_of([settles, lasts])
+    assert best == (lasts if is_taken else settles)
+
+
+def test_the_first_samples_tell_a_start_and_the_others_count():
+    """A drift that no input makes: a start fitted to all of it would follow the drift."""
+    rng = np.random.default_rng(5)
+    u = np.repeat(rng.uniform(-1, 1, 30), 10)
+    y = lfilter([0.0, 0.1], [1.0, -0.9], u)
+    options = replace(OPTIONS, input_map="none", output_map="none")
+    options = replace(options, initial_state="estimated")
+    own = Recording("a", u, y + 1e-4 * rng.standard_normal(N), 1.0)
+    found = fit([own], Orders(1, 1, 1), options)
+    later = replace(own, output=y + np.where(np.arange(N) < 60, 0.0, 0.5))
+    left = later.output[60:] - y[60:]
+    expected = np.sqrt(np.mean(left**2)) / np.std(later.output)
+    assert together._share_off(found, later) == pytest.approx(expected, rel=0.01)

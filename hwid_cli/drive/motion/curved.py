@@ -28,6 +28,7 @@ from hwid_cli.drive.motion.push import (
 )
 from hwid_cli.drive.motion.springs import beyond, beyond_side, reaches_side, spring_rate
 from hwid_cli.drive.motion.state import (
+    CIRCUIT,
     DEFLECTION,
     MOTOR_V,
     MOTOR_X,
@@ -54,6 +55,8 @@ JUST_IN = 1e-300
 # A step within which drag settles so often is taken implicitly: Runge-Kutta steps explode
 # from 2.8 on.
 SETTLES = 2.0
+# Steps in a sample that a winding asks for at most, whose fast part is followed exactly.
+WINDING_STEPS = 2.0
 # A contact's force begins with an edge in its slope: its steps are this much shorter.
 CONTACT_FINER = 2.0
 
@@ -67,6 +70,22 @@ def is_always_curved(p: np.ndarray) -> bool:
     p : ndarray, shape (N_SLOTS,)
     """
     return is_force_curved(p) or (depends_on_motion(p) and has_losses(p))
+
+
+@compiled(**INNER)
+def has_plain_winding(p: np.ndarray) -> bool:
+    """Return whether a winding's current acts on the mass alone, without losses or limits.
+
+    Then its fast part is followed exactly, and steps need not be as short as it is fast.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    is_alone = p[slots.GEAR_STIFFNESS] == 0.0 and p[slots.MODE_MASS] == 0.0
+    is_plain = p[slots.DRIVE_VARIES] == 0.0 and p[slots.CLIP_LIMIT] == np.inf
+    is_winding = p[slots.RESISTANCE] > 0.0 and p[slots.INDUCTANCE] > 0.0
+    return is_alone and is_plain and is_winding and not has_losses(p)
 
 
 @compiled(**INNER)
@@ -217,7 +236,10 @@ def step_limit(
         both = 1.0 / p[slots.MODE_MASS] + 1.0 / mass
         rate += np.sqrt(p[slots.MODE_STIFFNESS] * both) + p[slots.MODE_DAMPING] * both
     if p[slots.INDUCTANCE] > 0.0:
-        rate += p[slots.RESISTANCE] / p[slots.INDUCTANCE]
+        fast = p[slots.RESISTANCE] / p[slots.INDUCTANCE]
+        if has_plain_winding(p):
+            fast = min(fast, WINDING_STEPS * LONGEST_PHASE / p[slots.SAMPLE_TIME])
+        rate += fast
     if p[slots.HYSTERESIS_FORCE] != 0.0:
         rate += _rate_of_yielding(state, memory, mass, p)
     if p[slots.OWN_FORCE] != 0.0:
@@ -489,6 +511,9 @@ def step_all(
     if p[slots.MODE_MASS] == 0.0 and not depends_on_motion(p):
         _step_coupled(state, trial, memory, push, done, h, is_held, p)
         return
+    if has_plain_winding(p):
+        _step_wound(state, trial, memory, push, done, h, is_held, p)
+        return
     total, slope = np.zeros(N_STATE), np.empty(N_STATE)
     for n in range(N_STATE):
         trial[n] = state[n]
@@ -543,3 +568,94 @@ def _step_coupled(
     sixth = h / 6.0
     trial[X], trial[V] = x0 + sixth * dx, v0 + sixth * dv
     trial[MOTOR_X], trial[MOTOR_V] = xm0 + sixth * dxm, vm0 + sixth * dvm
+
+
+@compiled(**INNER)
+def _step_wound(
+    state: np.ndarray,
+    trial: np.ndarray,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    h: float,
+    is_held: bool,
+    p: np.ndarray,
+) -> None:
+    """Step of a mass behind a winding, however fast its current settles.
+
+    The current takes an exponential Runge-Kutta step (ETDRK4: Cox, Matthews 2002); in
+    place of position and velocity their sums with the current are followed, which its
+    fast part does not push. docs/method_diagnosis.md, eq. (D7a).
+    """
+    pace = p[slots.RESISTANCE] / p[slots.INDUCTANCE]
+    gain = p[slots.FORCE_CONSTANT] / (pace * p[slots.MASS])
+    i0 = state[CIRCUIT]
+    x0, v0 = state[X] - gain / pace * i0, state[V] + gain * i0
+    half, half1, _, _ = _fading(0.5 * pace * h)
+    whole, whole1, whole2, whole3 = _fading(pace * h)
+    half1 *= 0.5 * h
+    x, v, i, rate0 = x0, v0, i0, 0.0
+    before = rate = di = dx = dv = 0.0
+    for stage in range(4):
+        after, weight, way = runge_kutta_stage(stage, h)
+        at = done + after
+        position, velocity = x + gain / pace * i, v - gain * i
+        if is_held:
+            position, velocity = state[X], 0.0
+        across = value_of(push, DRIVE, at) - p[slots.BACK_EMF] * velocity
+        net = value_of(push, OTHER, at) - resisting(position, velocity, memory, p)
+        if p[slots.OWN_FORCE] != 0.0:
+            net += own_force(position, velocity, memory[WAY], push, at, p)
+        drawn = across / p[slots.RESISTANCE]
+        rate = across / p[slots.INDUCTANCE]
+        slope = v - gain * drawn
+        turn = (net + p[slots.FORCE_CONSTANT] * drawn) / p[slots.MASS]
+        dx += weight * slope
+        dv += weight * turn
+        x, v = x0 + way * slope, v0 + way * turn
+        if stage == 0:
+            rate0 = rate
+            di += (whole1 - 3.0 * whole2 + 4.0 * whole3) * rate
+            i = half * i0 + half1 * rate
+            before = i
+        elif stage == 1:
+            di += 2.0 * (whole2 - 2.0 * whole3) * rate
+            i = half * i0 + half1 * rate
+        elif stage == 2:
+            di += 2.0 * (whole2 - 2.0 * whole3) * rate
+            i = half * before + half1 * (2.0 * rate - rate0)
+        else:
+            di += (4.0 * whole3 - whole2) * rate
+    for n in range(N_STATE):
+        trial[n] = state[n]
+    i = whole * i0 + h * di
+    trial[CIRCUIT] = i
+    if not is_held:
+        sixth = h / 6.0
+        trial[X] = x0 + sixth * dx + gain / pace * i
+        trial[V] = v0 + sixth * dv - gain * i
+    # A motor that is part of the mass.
+    trial[MOTOR_X], trial[MOTOR_V] = trial[X], trial[V]
+
+
+@compiled(**INNER)
+def _fading(turns: float) -> tuple[float, float, float, float]:
+    """Return exp(-z) and the functions phi_1 to phi_3 of exponential integrators at -z.
+
+    Parameters
+    ----------
+    turns : float, [-]
+        z, not negative.
+    """
+    rest = np.exp(-turns)
+    if turns > 1.0:
+        first = (1.0 - rest) / turns
+        second = (1.0 - first) / turns
+        return rest, first, second, (0.5 - second) / turns
+    # Small differences of large numbers there: a series in place of them.
+    third, term = 0.0, 1.0 / 6.0
+    for n in range(4, 18):
+        third += term
+        term *= -turns / n
+    second = 0.5 - turns * third
+    return rest, 1.0 - turns * second, second, third

@@ -1960,6 +1960,17 @@ static int drive_is_always_curved(double *p)
     return drive_is_force_curved(p) || (drive_depends_on_motion(p) && drive_has_losses(p));
 }
 
+static int drive_has_plain_winding(double *p)
+{
+    int is_alone = 0;
+    int is_plain = 0;
+    int is_winding = 0;
+    is_alone = (p[GEAR_STIFFNESS] == 0.0) && (p[MODE_MASS] == 0.0);
+    is_plain = (p[DRIVE_VARIES] == 0.0) && (p[CLIP_LIMIT] == HUGE_VAL);
+    is_winding = (p[RESISTANCE] > 0.0) && (p[INDUCTANCE] > 0.0);
+    return is_alone && is_plain && is_winding && (!drive_has_losses(p));
+}
+
 static int drive_touches(double x, double *p)
 {
     int is_bent = 0;
@@ -2275,7 +2286,11 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
         rate += sqrt(p[MODE_STIFFNESS] * both) + (p[MODE_DAMPING] * both);
     }
     if (p[INDUCTANCE] > 0.0) {
-        rate += p[RESISTANCE] / p[INDUCTANCE];
+        fast = p[RESISTANCE] / p[INDUCTANCE];
+        if (drive_has_plain_winding(p)) {
+            fast = least(fast, (2.0 * 0.3) / p[SAMPLE_TIME]);
+        }
+        rate += fast;
     }
     if (p[HYSTERESIS_FORCE] != 0.0) {
         rate += drive_rate_of_yielding(state, memory, mass, p);
@@ -2511,6 +2526,150 @@ static void drive_step_coupled(double *state, double *trial, double *memory, dou
     trial[MOTOR_V] = vm0 + (sixth * dvm);
 }
 
+static tuple_dddd drive_fading(double turns)
+{
+    double rest = 0.0;
+    double first = 0.0;
+    double second = 0.0;
+    double third = 0.0;
+    double term = 0.0;
+    int n = 0;
+    rest = exp(-turns);
+    if (turns > 1.0) {
+        first = (1.0 - rest) / turns;
+        second = (1.0 - first) / turns;
+        return (tuple_dddd){rest, first, second, (0.5 - second) / turns};
+    }
+    third = 0.0;
+    term = 1.0 / 6.0;
+    for (n = 4; n < 18; ++n) {
+        third += term;
+        term *= (-turns) / n;
+    }
+    second = 0.5 - (turns * third);
+    return (tuple_dddd){rest, 1.0 - (turns * second), second, third};
+}
+
+static void drive_step_wound(double *state, double *trial, double *memory, double *push, double done, double h, int is_held, double *p)
+{
+    double pace = 0.0;
+    double gain = 0.0;
+    double i0 = 0.0;
+    double x0 = 0.0;
+    double v0 = 0.0;
+    tuple_dddd t1 = {0};
+    double half = 0.0;
+    double half1 = 0.0;
+    tuple_dddd t2 = {0};
+    double whole = 0.0;
+    double whole1 = 0.0;
+    double whole2 = 0.0;
+    double whole3 = 0.0;
+    double x = 0.0;
+    double v = 0.0;
+    double i = 0.0;
+    double rate0 = 0.0;
+    double dv = 0.0;
+    double before = 0.0;
+    double rate = 0.0;
+    double di = 0.0;
+    double dx = 0.0;
+    int stage = 0;
+    tuple_ddd t3 = {0};
+    double after = 0.0;
+    double weight = 0.0;
+    double way = 0.0;
+    double at = 0.0;
+    double position = 0.0;
+    double velocity = 0.0;
+    double across = 0.0;
+    double net = 0.0;
+    double drawn = 0.0;
+    double slope = 0.0;
+    double turn = 0.0;
+    int n = 0;
+    double sixth = 0.0;
+    pace = p[RESISTANCE] / p[INDUCTANCE];
+    gain = p[FORCE_CONSTANT] / (pace * p[MASS]);
+    i0 = state[CIRCUIT];
+    x0 = state[X] - ((gain / pace) * i0);
+    v0 = state[V] + (gain * i0);
+    t1 = drive_fading((0.5 * pace) * h);
+    half = t1.m0;
+    half1 = t1.m1;
+    t2 = drive_fading(pace * h);
+    whole = t2.m0;
+    whole1 = t2.m1;
+    whole2 = t2.m2;
+    whole3 = t2.m3;
+    half1 *= 0.5 * h;
+    x = x0;
+    v = v0;
+    i = i0;
+    rate0 = 0.0;
+    dv = 0.0;
+    before = dv;
+    rate = dv;
+    di = dv;
+    dx = dv;
+    for (stage = 0; stage < 4; ++stage) {
+        t3 = drive_runge_kutta_stage(stage, h);
+        after = t3.m0;
+        weight = t3.m1;
+        way = t3.m2;
+        at = done + after;
+        position = x + ((gain / pace) * i);
+        velocity = v - (gain * i);
+        if (is_held) {
+            position = state[X];
+            velocity = 0.0;
+        }
+        across = drive_value_of(push, DRIVE, at) - (p[BACK_EMF] * velocity);
+        net = drive_value_of(push, OTHER, at) - drive_resisting(position, velocity, memory, p);
+        if (p[OWN_FORCE] != 0.0) {
+            net += drive_own_force(position, velocity, memory[WAY], push, at, p);
+        }
+        drawn = across / p[RESISTANCE];
+        rate = across / p[INDUCTANCE];
+        slope = v - (gain * drawn);
+        turn = (net + (p[FORCE_CONSTANT] * drawn)) / p[MASS];
+        dx += weight * slope;
+        dv += weight * turn;
+        x = x0 + (way * slope);
+        v = v0 + (way * turn);
+        if (stage == 0) {
+            rate0 = rate;
+            di += ((whole1 - (3.0 * whole2)) + (4.0 * whole3)) * rate;
+            i = (half * i0) + (half1 * rate);
+            before = i;
+        } else {
+            if (stage == 1) {
+                di += (2.0 * (whole2 - (2.0 * whole3))) * rate;
+                i = (half * i0) + (half1 * rate);
+            } else {
+                if (stage == 2) {
+                    di += (2.0 * (whole2 - (2.0 * whole3))) * rate;
+                    i = (half * before) + (half1 * ((2.0 * rate) - rate0));
+                } else {
+                    di += ((4.0 * whole3) - whole2) * rate;
+                }
+            }
+        }
+    }
+    for (n = 0; n < N_STATE; ++n) {
+        trial[n] = state[n];
+    }
+    i = (whole * i0) + (h * di);
+    trial[CIRCUIT] = i;
+    if (!is_held) {
+        sixth = h / 6.0;
+        trial[X] = (x0 + (sixth * dx)) + ((gain / pace) * i);
+        trial[V] = (v0 + (sixth * dv)) - (gain * i);
+    }
+    trial[MOTOR_X] = trial[X];
+    trial[MOTOR_V] = trial[V];
+}
+
 static void drive_step_all(double *state, double *trial, double *memory, double *push, double done, double h, int is_held, double *p)
 {
     int each = 0;
@@ -2529,6 +2688,10 @@ static void drive_step_all(double *state, double *trial, double *memory, double 
     double slope[N_STATE];
     if ((p[MODE_MASS] == 0.0) && (!drive_depends_on_motion(p))) {
         drive_step_coupled(state, trial, memory, push, done, h, is_held, p);
+        return;
+    }
+    if (drive_has_plain_winding(p)) {
+        drive_step_wound(state, trial, memory, push, done, h, is_held, p);
         return;
     }
     for (each = 0; each < N_STATE; ++each) {
