@@ -138,6 +138,10 @@ def group_bound(
     return tuple(counts)
 
 
+# A fit that no smaller one leads to, over one that it does, [-].
+_ANEW = 2.5
+
+
 class _NotStoredError(Exception):
     """A search asks for what the cache does not have."""
 
@@ -197,7 +201,7 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     together = _seconds_together(planning, n, n_candidates)
     if together is not None:
         more, seconds = together
-        what = f"one group of all, at most {more} fits" + (f"; {what}" if fits else "")
+        what = f"one group of all, about {more} fits" + (f"; {what}" if fits else "")
     else:
         more, seconds = 0, 0.0
     plan = StagePlan(
@@ -249,7 +253,7 @@ def _seconds_together(
         units=min(experiment.fit.units, FEW_UNITS),
         n_recordings=n_candidates - 1,
     )
-    return count, count * (each + TASK_SECONDS) / planning.workers
+    return count, count * (_ANEW * each + TASK_SECONDS) / planning.workers
 
 
 STAGE = Stage(

@@ -155,7 +155,7 @@ def folds_of(n: int) -> list[list[int]]:
 
 
 def most_fits(options: FitOptions, n_recordings: int, n_orders: int) -> int:
-    """Number of fits that the model of all takes at most.
+    """Number of fits that the model of all takes, but for fits that are refused.
 
     Examples
     --------
@@ -195,8 +195,7 @@ def fit_together(
     )
     more = [with_units(of_kind, n) for n in (_FEWEST_UNITS, FEW_UNITS, _MOST_UNITS)]
     best = folds.best_of([replace(best, options=one) for one in dict.fromkeys(more)])
-    chosen = folds.best_of([Candidate(best.options, *at) for at in orders])
-    whole = folds.whole(chosen)
+    chosen, whole = folds.fitted([Candidate(best.options, *at) for at in orders])
     return Together(whole, chosen.nb, chosen.nk, folds.n_fits)
 
 
@@ -247,8 +246,20 @@ class _Folds:
         near = [one for one in pool if self._known[one] <= least + np.log1p(_AS_CLOSE)]
         return min(near, key=lambda one: (one.size, self._known[one]))
 
-    def whole(self, candidate: Candidate) -> Fit:
-        """The candidate fitted to all recordings, with standard errors."""
+    def fitted(self, candidates: Sequence[Candidate]) -> tuple[Candidate, Fit]:
+        """The best candidate, fitted to all recordings with standard errors.
+
+        Where only that fit never forgets its start, the next best is taken.
+        """
+        for _ in candidates:
+            best = self.best_of(candidates)
+            whole = self._whole(best)
+            if best in self._lasting or not self._outlasts(whole):
+                break
+            self._lasting.add(best)
+        return best, whole
+
+    def _whole(self, candidate: Candidate) -> Fit:
         (found,) = self._fits([self._task(candidate, ())])
         return replace(found, identified_on=tuple(one.name for one in self._recordings))
 

@@ -1,6 +1,6 @@
 """One model of all recordings, on plants whose laws are written here."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain
 from types import SimpleNamespace
 
@@ -247,3 +247,32 @@ def test_the_first_samples_tell_a_start_and_the_others_count():
     left = later.output[60:] - y[60:]
     expected = np.sqrt(np.mean(left**2)) / np.std(later.output)
     assert together._share_off(found, later) == pytest.approx(expected, rel=0.01)
+
+
+def test_what_only_lasts_in_the_fit_of_all_gives_way_to_the_next_best(monkeypatch):
+    near, next_best = (Candidate(OPTIONS, 1, n, Orders(1, n, 1)) for n in (1, 2))
+
+    def fits(_self, tasks):
+        found = []
+        for task in tasks:
+            is_whole = len(task.arguments[0]) == len(STEPS)
+            pole = 1.0 if is_whole and task.arguments[1].nf == 1 else 0.9
+            model = SimpleNamespace(denominator=np.array([1.0, -pole]))
+            found.append(Named(model, task.arguments[1]))
+        return found
+
+    def share_off(found, _recording):
+        return 0.08 + 0.02 * found.orders.nf
+
+    monkeypatch.setattr(together._Folds, "_fits", fits)
+    monkeypatch.setattr(together, "_share_off", share_off)
+    best, whole = together._Folds(STEPS, None).fitted([near, next_best])
+    assert best == next_best
+    assert whole.orders == next_best.orders
+
+
+@dataclass
+class Named:
+    model: SimpleNamespace
+    orders: Orders
+    identified_on: tuple = ()
