@@ -23,7 +23,7 @@ LOCKED_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-chec
         bench bench-beyond bench-campaign bench-growth bench-maps bench-page bench-rounds bench-search bench-size bench-starts bench-wide bench-advice docs \
         bench-real bench-trust bench-next bench-repeats scale \
         wheel lowest away-run lock sbom licences simulate calibrate identify crossval group test-stage steps model1 model2 \
-        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check laws blind machines
+        reproduction thesis chapter2 hsm150 diagnose gun real effects drive-source model-schema golden export-check laws blind machines folders
 
 help:  ## show these targets
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / {printf "  make %-14s %s\n", $$1, $$2}' Makefile
@@ -275,6 +275,9 @@ blind: $(DEV)  ## blind test with effects hidden by a separate generator, and do
 	$(BIN)/python tests/blind/run_blind.py --suite full --suite poor --suite clean --suite nuisance \
 	  --suite outside --suite near --suite pairs --suite small --seeds reporting \
 	  --number $(BLIND_NUMBER) --jobs 2 --work $(BLIND) --write docs/blind_test.md
+
+folders: $(DEV)  ## models of folders of recordings, judged on recordings that come later: five minutes
+	$(BIN)/python -m tests.folders.run_folders --work results/folders
 
 # Independent equations and integrators. Each of the seeds for reports is for one of them.
 MACHINE_SEEDS := sixth_reporting

@@ -223,28 +223,39 @@ class _Folds:
         self._recordings, self._run = tuple(recordings), run
         self._contents = [recording_key(one) for one in recordings]
         self._out = folds_of(len(recordings))
-        self._known: dict[Candidate, float] = {}
+        self._fits_of: dict[Candidate, list[Fit]] = {}
         self._lasting: set[Candidate] = set()
         self.n_fits = 0
 
-    def best_of(self, candidates: Sequence[Candidate]) -> Candidate:
-        """The smallest of those that are nearly as close as the closest one."""
-        new = [one for one in candidates if one not in self._known]
+    def best_of(
+        self, candidates: Sequence[Candidate], *, is_of_motion: bool = False
+    ) -> Candidate:
+        """The smallest of those that are nearly as close as the closest one.
+
+        Parameters
+        ----------
+        is_of_motion : bool
+            Compare how outputs move, whatever their level and size: of a left out step
+            that is higher than all others the maps know no end, whatever the orders are.
+        """
+        new = [one for one in candidates if one not in self._fits_of]
         tasks = [self._task(one, left_out) for one in new for left_out in self._out]
         found = iter(self._fits(tasks))
         for one in new:
-            fits = [next(found) for _ in self._out]
-            self._known[one] = self._off(fits)
+            fits = self._fits_of[one] = [next(found) for _ in self._out]
             if any(map(self._outlasts, fits)):
                 self._lasting.add(one)
-        pool = list(candidates)
-        least = min(self._known[one] for one in pool)
+        off = {
+            one: self._off(self._fits_of[one], is_of_motion=is_of_motion)
+            for one in candidates
+        }
+        least, pool = min(off.values()), list(off)
         settling = [one for one in pool if one not in self._lasting]
-        nearest = min((self._known[one] for one in settling), default=np.inf)
+        nearest = min((off[one] for one in settling), default=np.inf)
         if nearest <= least + np.log(_WORTH_LASTING):
             pool, least = settling, nearest
-        near = [one for one in pool if self._known[one] <= least + np.log1p(_AS_CLOSE)]
-        return min(near, key=lambda one: (one.size, self._known[one]))
+        near = [one for one in pool if off[one] <= least + np.log1p(_AS_CLOSE)]
+        return min(near, key=lambda one: (one.size, off[one]))
 
     def fitted(self, candidates: Sequence[Candidate]) -> tuple[Candidate, Fit]:
         """The best candidate, fitted to all recordings with standard errors.
@@ -252,7 +263,7 @@ class _Folds:
         Where only that fit never forgets its start, the next best is taken.
         """
         for _ in candidates:
-            best = self.best_of(candidates)
+            best = self.best_of(candidates, is_of_motion=True)
             whole = self._whole(best)
             if best in self._lasting or not self._outlasts(whole):
                 break
@@ -272,12 +283,14 @@ class _Folds:
         )
         return found
 
-    def _off(self, fits: Sequence[Fit]) -> float:
+    def _off(self, fits: Sequence[Fit], *, is_of_motion: bool) -> float:
         """Mean logarithm of how far fits are off what each has left out."""
-        logs = []
-        for found, left_out in zip(fits, self._out, strict=True):
-            for one in (self._recordings[place] for place in left_out):
-                logs.append(np.log(_share_off(found, one)))
+        pairs = [
+            (found, self._recordings[place])
+            for found, left_out in zip(fits, self._out, strict=True)
+            for place in left_out
+        ]
+        logs = [np.log(_share_off(*pair, is_of_motion=is_of_motion)) for pair in pairs]
         return float(np.mean(logs))
 
     def _outlasts(self, found: Fit) -> bool:
@@ -311,11 +324,16 @@ class _Folds:
         )
 
 
-def _share_off(found: Fit, recording: Recording) -> float:
+def _share_off(found: Fit, recording: Recording, *, is_of_motion: bool) -> float:
     """RMSD over the standard deviation of the output, bounded on both sides.
 
     A start that all of a recording had told would follow what the model does not explain:
     it is told by the first samples, and the others count.
+
+    Parameters
+    ----------
+    is_of_motion : bool
+        Of the straight line through what is simulated that comes closest.
     """
     if found.model is None:
         return _FARTHEST
@@ -327,6 +345,12 @@ def _share_off(found: Fit, recording: Recording) -> float:
         simulated = simulate(found.model, recording.input, initial_state=state)
     else:
         simulated = validation_output(found.model, recording)
-    off = rmsd(output[first:], simulated[first:])
+    if not np.isfinite(simulated).all():
+        return _FARTHEST
+    measured, simulated = output[first:], simulated[first:]
+    if is_of_motion:
+        line = np.column_stack([np.ones(simulated.size), simulated])
+        simulated = line @ np.linalg.lstsq(line, measured, rcond=None)[0]
+    off = rmsd(measured, simulated)
     share = off / max(float(np.std(output)), np.finfo(float).tiny)
-    return float(np.clip(share, 1e-9, _FARTHEST)) if np.isfinite(share) else _FARTHEST
+    return float(np.clip(share, 1e-9, _FARTHEST))

@@ -225,7 +225,7 @@ def test_a_model_that_never_forgets_its_start_has_to_be_worth_it(
             for task in tasks
         ]
 
-    def share_off(found, _recording):
+    def share_off(found, _recording, *, is_of_motion):
         return 0.1 * off if found.model.denominator[1] == -0.9 else 0.1
 
     monkeypatch.setattr(together._Folds, "_fits", fits)
@@ -246,7 +246,9 @@ def test_the_first_samples_tell_a_start_and_the_others_count():
     later = replace(own, output=y + np.where(np.arange(N) < 60, 0.0, 0.5))
     left = later.output[60:] - y[60:]
     expected = np.sqrt(np.mean(left**2)) / np.std(later.output)
-    assert together._share_off(found, later) == pytest.approx(expected, rel=0.01)
+    assert together._share_off(found, later, is_of_motion=False) == pytest.approx(
+        expected, rel=0.01
+    )
 
 
 def test_what_only_lasts_in_the_fit_of_all_gives_way_to_the_next_best(monkeypatch):
@@ -261,7 +263,7 @@ def test_what_only_lasts_in_the_fit_of_all_gives_way_to_the_next_best(monkeypatc
             found.append(Named(model, task.arguments[1]))
         return found
 
-    def share_off(found, _recording):
+    def share_off(found, _recording, *, is_of_motion):
         return 0.08 + 0.02 * found.orders.nf
 
     monkeypatch.setattr(together._Folds, "_fits", fits)
@@ -276,3 +278,16 @@ class Named:
     model: SimpleNamespace
     orders: Orders
     identified_on: tuple = ()
+
+
+@pytest.mark.parametrize("is_of_motion", [False, True])
+def test_orders_are_told_by_how_an_output_moves_whatever_its_size(is_of_motion):
+    """A map that ends too early halves a step: no order can mend that."""
+    u = np.repeat(np.random.default_rng(6).uniform(-1, 1, 30), 10)
+    u[:10] = 0.0
+    y = lfilter([0.0, 0.1], [1.0, -0.9], u)
+    options = replace(OPTIONS, input_map="none", output_map="none")
+    found = fit([Recording("a", u, y, 1.0)], Orders(1, 1, 1), options)
+    larger = Recording("b", u, 2.0 * y + 3.0, 1.0)
+    off = together._share_off(found, larger, is_of_motion=is_of_motion)
+    assert (off < 1e-3) == is_of_motion
