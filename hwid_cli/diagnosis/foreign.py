@@ -23,7 +23,7 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence
 from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
-from hwid_cli.diagnosis.single_effects import single_in_simulation
+from hwid_cli.diagnosis.single_effects import ToldByRuns, single_in_simulation
 from hwid_cli.diagnosis.stand_in import change_between
 from hwid_cli.diagnosis.standing import its_own, standing_beside
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
@@ -209,16 +209,33 @@ def _found(
         # Nothing more to look for: no gap, or parameters.
         if found.verdict.word in ("none", "parameters"):
             return confirm(found, runs, values)
-    if runs.simulator.run is None:
-        standing = _with_nearer_spring(standing, singles, runs.run_tasks, on_round)
-    if alone is not None:
         alone = with_further_effect(alone, runs, options, on_round)
-        if alone.findings is not None and alone.is_all:
-            return alone.findings, alone.values, True
+        is_told = alone.findings is not None
+        if runs.run_tasks.are_spent or (is_told and alone.is_all):
+            lead = _with_runs(unconfirmed(found), alone)
+            return alone.findings or lead, alone.values, is_told
+    else:
+        standing = _with_nearer_spring(standing, singles, runs, on_round)
+    return _of_sets(standing, options, simulation, on_round, given_sse, alone)
+
+
+def _of_sets(
+    standing: DiagnosisProblem,
+    options: DiagnoseOptions,
+    simulation: tuple[Runs, dict[str, float]],
+    on_round: OnRound,
+    given_sse: np.ndarray | None,
+    alone: ToldByRuns | None,
+) -> tuple[Findings, dict[str, float], bool]:
+    """What the stand-in lacks, several effects at once, put into the simulation.
+
+    Parameters
+    ----------
+    alone : ToldByRuns or None
+        What single effects in the simulation have told, where they were tried.
+    """
+    runs, values = simulation
     one = None if alone is None else alone.findings
-    if alone is not None and runs.run_tasks.are_spent:
-        is_told = one is not None
-        return one or unconfirmed(found), alone.values, is_told
     # What a stand-in leaves of an effect that runs bear out is its own error: pieces,
     # which are asked where nothing is settled, would only repeat it.
     found = find(
@@ -226,9 +243,23 @@ def _found(
     )
     on_round("the effect in the simulation", 0)
     several = confirm(found, runs, values)
-    if alone is None or one is None or _leaves_less(several, one):
+    if alone is None:
         return several
+    if one is None or _leaves_less(several, one):
+        told, moved, is_confirmed = several
+        return _with_runs(told, alone), moved, is_confirmed
     return one, alone.values, True
+
+
+def _with_runs(found: Findings, alone: ToldByRuns) -> Findings:
+    """Findings in which nothing is named, with what the simulation's runs say of effects.
+
+    Leads are taken from there rather than from a stand-in that errs.
+    """
+    if found.verdict.word != "unknown":
+        return found
+    fits = {**found.found.fits, **alone.fits}
+    return replace(found, found=replace(found.found, fits=fits))
 
 
 def _leaves_less(
@@ -286,10 +317,10 @@ def _law_instead(
 def _with_nearer_spring(
     standing: DiagnosisProblem,
     singles: DiagnoseOptions,
-    run_tasks: RunTasks,
+    runs: Runs,
     on_round: OnRound,
 ) -> DiagnosisProblem:
-    """The stand-in whose curved spring changes as the recordings say.
+    """The stand-in whose curved spring changes as the recordings say; of outputs alone.
 
     Outputs do not tell whether a parameter that is off belongs to the straight part of a
     spring alone, as beside a hardening one, or to all of it, as the weight of a pendulum.
@@ -300,11 +331,13 @@ def _with_nearer_spring(
         For single effects alone.
     """
     drive = standing.drive
+    if runs.simulator.run is not None:
+        return standing
     if not isinstance(drive, StandIn) or drive.bends == (0.0, 0.0):
         return standing
     whole = replace(drive, one_curve_N_per_m=drive.stiffness_N_per_m)
     problems = (standing, replace(standing, drive=whole))
-    found = [find(one, singles, run_tasks, on_round) for one in problems]
+    found = [find(one, singles, runs.run_tasks, on_round) for one in problems]
     criteria, base = found[0].criteria, found[0].base
 
     def worth(row: int) -> tuple[bool, float]:

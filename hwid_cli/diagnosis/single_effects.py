@@ -6,7 +6,7 @@ docs/method_diagnosis.md, eq. (D33).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -55,11 +55,14 @@ class ToldByRuns:
         that explains most, which the parameters may have imitated.
     is_all : bool
         Whether that run leaves so little that a further effect could not be named.
+    fits : mapping of tuple of str to CandidateFit
+        What runs with single effects left.
     """
 
     findings: Findings | None
     values: dict[str, float]
     is_all: bool
+    fits: Mapping[tuple[str, ...], CandidateFit] = field(default_factory=dict)
 
 
 def single_in_simulation(
@@ -105,7 +108,7 @@ def single_in_simulation(
         is_all = findings.criteria.is_nearly_all(told.verdict.chosen, findings.base)
         return ToldByRuns(told, moved, is_all)
     moved = _moved_by_best(findings, tried, fits, values)
-    return ToldByRuns(None, moved, is_all=False)
+    return ToldByRuns(None, moved, is_all=False, fits=fits)
 
 
 def _twins_in_simulation(

@@ -12,6 +12,7 @@ from hwid_cli.diagnosis import foreign
 from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.run_starts import Begun, RunStarts
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
+from hwid_cli.diagnosis.single_effects import ToldByRuns
 from hwid_cli.diagnosis.standing import as_given, stand_in_for
 from hwid_cli.diagnosis.untold import Untold
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
@@ -602,12 +603,14 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
     def find(_standing, options, *_, may_cut=True):
         asked.append((options.max_effects, may_cut))
         chosen = made_up((), 100.0, parameters=0)
-        return SimpleNamespace(verdict=SimpleNamespace(word="unknown", chosen=chosen))
+        verdict = SimpleNamespace(word="unknown", chosen=chosen)
+        return Some(verdict, Some(fits={}))
 
     one = find(None, DiagnoseOptions()) if is_borne_out else None
     asked.clear()
-    alone = SimpleNamespace(findings=one, values={"c": 1.0}, is_all=False)
+    alone = ToldByRuns(one, {"c": 1.0}, is_all=False)
     monkeypatch.setattr(foreign, "find", find)
+    monkeypatch.setattr(foreign, "with_further_effect", lambda first, *_: first)
     monkeypatch.setattr(foreign, "single_in_simulation", lambda *_: alone)
     monkeypatch.setattr(
         foreign, "confirm", lambda found, *_: (found, {"c": 1.0}, False)
@@ -776,3 +779,32 @@ def test_after_the_runs_that_are_allowed_the_answer_is_the_best_until_then():
     # The effect that has begun is tried to its end; a second one is not looked for.
     assert counts[0] < counts[1]
     assert len(named[0]) < len(named[1]) == 2
+
+
+@pytest.mark.parametrize(("word", "is_of_runs"), [("unknown", True), ("named", False)])
+def test_leads_are_those_of_the_simulations_own_runs(word, is_of_runs):
+    said = made_up(("cogging",), 10.0)
+    other = made_up(("coulomb_friction",), 50.0)
+    run = replace(said, sse=90.0 * said.sse)
+    found = replaced_findings(word, {said.effects: said, other.effects: other})
+    told = foreign._with_runs(
+        found, ToldByRuns(None, {}, is_all=False, fits={said.effects: run})
+    )
+    assert told.found.fits[said.effects] is (run if is_of_runs else said)
+    assert told.found.fits[other.effects] is other
+
+
+@dataclass(frozen=True)
+class Some:
+    """Findings, or what was found, as far as it is read here."""
+
+    verdict: object = None
+    found: object = None
+    fits: object = None
+
+
+def replaced_findings(word, fits):
+    return Some(
+        DiagnosisVerdict(word, is_complete=False, chosen=None, rivals=()),
+        Some(fits=fits),
+    )
