@@ -405,7 +405,7 @@ def test_no_name_of_a_file_folder_or_column_begins_a_key(tmp_path):
     lines = out.read_text().splitlines()
     keys = [line.partition(":")[0] for line in lines if line[:1] not in ("", " ", "#")]
     expected = ["name", "recordings", "calibrate", "orders", "fit", "identify"]
-    assert keys == [*expected, "crossval", "order", "test"]
+    assert keys == [*expected, "crossval", "order", "test", "group"]
     assert "notes\\nname: evil.csv: no table of numbers" in " ".join(
         line.lstrip("# ") for line in lines
     )
