@@ -163,3 +163,14 @@ def test_recordings_to_take_are_named_with_the_place_of_their_files(
 def test_starts_that_a_prediction_does_not_have_are_told():
     (first, *_) = best_model_sentences(replace(BEST, has_estimated_starts=True))
     assert first.endswith("(c and d), starts estimated from the measured output")
+
+
+def test_maps_that_folds_chose_are_said():
+    found = BestModel("a+b/1/2", "test", ("c",), 0.002, "m", 0.01)
+    maps = (("piecewise_linear", 3), ("none", 0))
+    said = best_model_sentences(replace(found, own_maps=maps))
+    assert (
+        "its maps, piecewise linear, 3 and none, come closest to recordings left out in turn"
+        in said
+    )
+    assert not any("maps" in one for one in best_model_sentences(found))

@@ -196,6 +196,8 @@ def test_a_group_of_all_that_had_grown_gives_way():
     assert [one.group for one in whole.joins] == ["a", "b", "a+b"]
     assert whole.joins[-1] == Join(2, "b", "a", "a+b")
     assert whole.chain == ("b", "a+b")
+    # Whatever it covers.
+    assert with_whole(grown, replace(group("ab", 1.0), coverage=0)).chain[-1] == "a+b"
     # One that is farther off is not taken.
     assert with_whole(grown, group("ab", 2.5)).chain == ("b",)
     assert with_whole(grown, group("ab", float("nan"), nb=0)).chain == ("b",)
@@ -243,7 +245,7 @@ def test_the_first_samples_tell_a_start_and_the_others_count():
     options = replace(options, initial_state="estimated")
     own = Recording("a", u, y + 1e-4 * rng.standard_normal(N), 1.0)
     found = fit([own], Orders(1, 1, 1), options)
-    later = replace(own, output=y + np.where(np.arange(N) < 60, 0.0, 0.5))
+    later = replace(own, output=y + np.maximum(np.arange(N) - 60, 0.0) / N)
     left = later.output[60:] - y[60:]
     expected = np.sqrt(np.mean(left**2)) / np.std(later.output)
     assert together._share_off(found, later, is_of_motion=False) == pytest.approx(
@@ -291,3 +293,20 @@ def test_orders_are_told_by_how_an_output_moves_whatever_its_size(is_of_motion):
     larger = Recording("b", u, 2.0 * y + 3.0, 1.0)
     off = together._share_off(found, larger, is_of_motion=is_of_motion)
     assert (off < 1e-3) == is_of_motion
+
+
+@pytest.mark.parametrize(("off", "is_small"), [(1.01, True), (1.05, False)])
+def test_of_what_is_nearly_as_close_the_smallest_is_taken(monkeypatch, off, is_small):
+    small, large = (Candidate(OPTIONS, 1, n, Orders(1, n, 1)) for n in (1, 2))
+
+    def fits(_self, tasks):
+        model = SimpleNamespace(denominator=np.array([1.0, -0.9]))
+        return [Named(model, task.arguments[1]) for task in tasks]
+
+    def share_off(found, _recording, *, is_of_motion):
+        return 0.1 * off if found.orders.nf == 1 else 0.1
+
+    monkeypatch.setattr(together._Folds, "_fits", fits)
+    monkeypatch.setattr(together, "_share_off", share_off)
+    best = together._Folds(STEPS, None).best_of([large, small])
+    assert best == (small if is_small else large)
