@@ -297,8 +297,12 @@ def _law_instead(
         Parameters of the simulation that no effect has moved.
     """
     is_open = options.laws == "auto" and options.effects is None
-    is_open = is_open and not runs.run_tasks.are_spent
-    if not is_open or verdict.word not in _NAMED or verdict.is_complete:
+    if (
+        runs.run_tasks.are_spent
+        or not is_open
+        or verdict.word not in _NAMED
+        or verdict.is_complete
+    ):
         return None
     on_round("a law instead", 0)
     standing = standing_beside(runs, problem, runs.of(problem.signals, values), values)

@@ -156,6 +156,12 @@ class MapOptions:
     degree: int = 5
     function: OwnFunction | None = None
 
+    @property
+    def kind_and_units(self) -> tuple[str, int]:
+        """Kind of the map and its units; 0 where units do not set its size."""
+        has_units = MAP_KINDS[self.kind].least_units is not None
+        return self.kind, self.units if has_units else 0
+
     def __post_init__(self) -> None:
         if self.kind not in MAP_KINDS:
             raise Refused(Refusal(self.kind, key=("map",), known=tuple(MAP_KINDS)))

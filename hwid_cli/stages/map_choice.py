@@ -200,11 +200,7 @@ def _deviations(
 
 def _named(options: FitOptions) -> tuple[str, int, str, int]:
     """Both maps, each with its size; 0 where its kind has none."""
-    first, second = (
-        (one.kind, one.units * _has_units(one.kind))
-        for one in (options.of_input, options.of_output)
-    )
-    return (*first, *second)
+    return (*options.of_input.kind_and_units, *options.of_output.kind_and_units)
 
 
 def _has_units(kind: str) -> bool:

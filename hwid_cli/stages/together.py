@@ -7,7 +7,7 @@ then their size, then the orders. The model itself is fitted to all of them.
 
 References
 ----------
-docs/method.md, section "Groups", eq. (36).
+docs/method.md, section "Groups", eq. (17a).
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -67,9 +67,9 @@ class Candidate:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Units of its maps and number of its coefficients: what small means."""
+        """Number of its coefficients and units of its maps: what small means."""
         maps = self.options.of_input, self.options.of_output
-        units = sum(one.units for one in maps if one.kind != "none")
+        units = sum(one.kind_and_units[1] for one in maps)
         return self.orders.nb + self.orders.nf, units
 
 
@@ -83,11 +83,8 @@ def own_maps(found: Fit, fits: Iterable[Fit]) -> tuple[tuple[str, int], ...]:
     """
 
     def maps_of(one: Fit) -> tuple[tuple[str, int], ...]:
-        pair = one.options.of_input, one.options.of_output
-        return tuple(
-            (each.kind, each.units if MAP_KINDS[each.kind].least_units else 0)
-            for each in pair
-        )
+        options = one.options
+        return options.of_input.kind_and_units, options.of_output.kind_and_units
 
     given = {maps_of(one) for one in fits if len(one.identified_on) == 1}
     own = maps_of(found)
@@ -215,11 +212,7 @@ def _typical(
 class _Folds:
     """Candidates, and how far each is off what it was not fitted to."""
 
-    def __init__(
-        self,
-        recordings: Sequence[Recording],
-        run: RunRound,
-    ) -> None:
+    def __init__(self, recordings: Sequence[Recording], run: RunRound) -> None:
         self._recordings, self._run = tuple(recordings), run
         self._contents = [recording_key(one) for one in recordings]
         self._out = folds_of(len(recordings))
@@ -262,13 +255,12 @@ class _Folds:
 
         Where only that fit never forgets its start, the next best is taken.
         """
-        for _ in candidates:
+        while True:
             best = self.best_of(candidates, is_of_motion=True)
             whole = self._whole(best)
             if best in self._lasting or not self._outlasts(whole):
-                break
+                return best, whole
             self._lasting.add(best)
-        return best, whole
 
     def _whole(self, candidate: Candidate) -> Fit:
         (found,) = self._fits([self._task(candidate, ())])

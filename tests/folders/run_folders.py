@@ -47,17 +47,13 @@ def inputs(
 def write_folder(plant: Plant, folder: Path, seed: int) -> dict[str, tuple]:
     """Write the recordings; give those that come later, input and clean output."""
     rng = np.random.default_rng(seed)
-    clean = [
-        plant.simulate(inputs(kind, n, plant, rng))
-        for n, kind in enumerate(plant.kinds)
-    ]
-    rng = np.random.default_rng(seed)
+    played = [inputs(kind, n, plant, rng) for n, kind in enumerate(plant.kinds)]
+    clean = [plant.simulate(u) for u in played]
     noise = plant.noise * np.ptp(np.concatenate(clean))
     folder.mkdir(parents=True, exist_ok=True)
-    for n, kind in enumerate(plant.kinds):
-        u = inputs(kind, n, plant, rng)
-        y = clean[n] + noise * np.random.default_rng([seed, n]).standard_normal(N)
-        write_csv(folder / f"{kind}_{n + 1}.csv", plant, u, y)
+    for n, (kind, u, y) in enumerate(zip(plant.kinds, played, clean, strict=True)):
+        measured = y + noise * np.random.default_rng([seed, n]).standard_normal(N)
+        write_csv(folder / f"{kind}_{n + 1}.csv", plant, u, measured)
     later = {kind: inputs(kind, 0, plant, rng) for kind in LATER}
     return {kind: (u, plant.simulate(u)) for kind, u in later.items()}
 
