@@ -309,8 +309,22 @@ def depth(node: Node) -> int:
 
 
 def has_friction(node: Node) -> bool:
-    """Whether a force jumps with the direction of motion: the drive may stick."""
-    return any(_is_direction(one) for one in node.walk())
+    """Whether a force jumps with the direction of motion: the drive may stick.
+
+    It does not where what the sign is multiplied by is 0 at rest, as in
+    ``sqrt(abs(v)) * sign(v)``.
+    """
+    if _is_direction(node):
+        return True
+    if node.name in ("*", "/") and any(_rests(one) for one in node.parts):
+        return False
+    return any(has_friction(one) for one in node.parts)
+
+
+def _rests(node: Node) -> bool:
+    """Whether a part that depends on the velocity alone is 0 where that is."""
+    is_smooth = names(node) == {"v"} and not has_friction(node)
+    return is_smooth and evaluate(node, {"v": 0.0}) == 0.0
 
 
 def _is_direction(node: Node) -> bool:

@@ -106,3 +106,20 @@ def test_edges_and_waves_are_seen():
     assert text.waves(text.parsed("sin(40*x + v) + cos(3*t)"), "t") == pytest.approx(3)
     assert text.has_friction(text.parsed("2*sign(v)*x"))
     assert not text.has_friction(text.parsed("sign(x)*v"))
+
+
+@pytest.mark.parametrize(
+    ("formula", "sticks"),
+    [
+        ("abs(v)**0.5*sign(v)", False),
+        ("2*Max(abs(v) - 0.3, 0)*sign(v)*x", False),
+        ("-sign(v)*v*x", False),
+        ("sign(v)*abs(v)*sign(v)", False),
+        ("abs(v)**0.5*sign(v) - 3*sign(v)", True),
+        ("(abs(v) + 1)*sign(v)", True),
+        ("x*sign(v)", True),
+        ("cos(v)*sign(v)", True),
+    ],
+)
+def test_a_sign_times_what_is_0_at_rest_is_no_friction(formula, sticks):
+    assert text.has_friction(text.parsed(formula)) is sticks

@@ -81,9 +81,9 @@ def test_a_step_of_voltage_at_a_blocked_drive_charges_the_coil(time):
     assert np.all(moved.output == moved.output[0])
 
 
-def followed_by_scipy(voltage, step, circuit, further, hold):
-    """Positions of a mass behind a fast coil with a curved force, from sample to sample."""
-    mass, damping, stiffness, gain, resistance, inductance = circuit
+def followed_by_scipy(voltage, step, circuit, force_of, hold):
+    """Positions of a mass behind a fast coil, from sample to sample."""
+    mass, damping, gain, resistance, inductance = circuit
     state, positions = np.zeros(3), [0.0]
     for first, last in pairwise(voltage):
         end = last if hold == "linear" else first
@@ -91,7 +91,7 @@ def followed_by_scipy(voltage, step, circuit, further, hold):
         def rates(t, now, first=first, end=end):
             x, v, i = now
             u = first + (end - first) * t / step
-            force = gain * i - damping * v - stiffness * x + further(x, v)
+            force = force_of(x, v, i) - damping * v
             drop = resistance * i + gain * v
             return [v, force / mass, (u - drop) / inductance]
 
@@ -103,39 +103,101 @@ def followed_by_scipy(voltage, step, circuit, further, hold):
     return np.array(positions)
 
 
-@pytest.mark.parametrize("hold", ["linear", "zero"])
-@pytest.mark.parametrize(
-    ("effects", "further"),
-    [
-        (
-            {"cubic_stiffness": {"stiffness_N_per_m3": 4e7}},
-            lambda x, v: -4e7 * x**3,
-        ),
-        (
-            {"quadratic_drag": {"drag_N_s2_per_m2": 6.0}},
-            lambda x, v: -6.0 * v * abs(v),
-        ),
-    ],
-)
-def test_curved_forces_behind_a_coil_much_faster_than_a_sample(effects, further, hold):
-    """A loudspeaker: its coil settles in 60 us, a sample is 500 us long."""
-    mass, damping, stiffness, gain, resistance, inductance = circuit = (
-        0.028, 1.6, 2200.0, 8.2, 5.6, 3.5e-4,
-    )  # fmt: skip
+def loudspeaker(effects, hold):
+    """A loudspeaker's voltage, motion and circuit: 60 us of coil in 500 us of sample."""
+    mass, damping, gain, resistance, inductance = circuit = 0.028, 1.6, 8.2, 5.6, 3.5e-4
     voltage = np.repeat(np.random.default_rng(4).uniform(-12, 12, 8), 10)
     voltage[:3] = 0.0
     drive = Drive(
         mass_kg=mass,
         damping_N_s_per_m=damping,
-        stiffness_N_per_m=stiffness,
+        stiffness_N_per_m=2200.0,
         force_constant_N_per_A=gain,
         resistance_ohm=resistance,
         inductance_H=inductance,
         effects=effects,
         hold=hold,
+        reference_current_A=2.0,
     )
     found = simulate_drive(voltage, drive, sample_time_s=5e-4).position
-    expected = followed_by_scipy(voltage, 5e-4, circuit, further, hold)
+    return voltage, found, circuit
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero"])
+@pytest.mark.parametrize(
+    ("effects", "force_of", "bound"),
+    [
+        (
+            {"cubic_stiffness": {"stiffness_N_per_m3": 4e7}},
+            lambda x, v, i: 8.2 * i - 2200 * x - 4e7 * x**3,
+            1e-5,
+        ),
+        (
+            {"quadratic_drag": {"drag_N_s2_per_m2": 6.0}},
+            lambda x, v, i: 8.2 * i - 2200 * x - 6.0 * v * abs(v),
+            1e-5,
+        ),
+        (
+            {"torque_ripple": {"share": 0.2, "per_turn": 300.0, "phase_rad": 0.4}},
+            lambda x, v, i: 8.2 * i * (1 + 0.2 * np.sin(300 * x + 0.4)) - 2200 * x,
+            1e-5,
+        ),
+        (
+            {"force_constant_saturation": {"loss_at_reference": 0.2}},
+            lambda x, v, i: 8.2 * i * (1 - 0.2 * (i / 2) ** 2) - 2200 * x,
+            1e-4,
+        ),
+        (
+            {"supply_sag": {"loss_at_reference": 0.2}},
+            lambda x, v, i: 8.2 * i * (1 - 0.2 * abs(i / 2)) - 2200 * x,
+            1e-4,
+        ),
+    ],
+)
+def test_curved_forces_behind_a_coil_much_faster_than_a_sample(
+    effects, force_of, bound, hold
+):
+    voltage, found, circuit = loudspeaker(effects, hold)
+    expected = followed_by_scipy(voltage, 5e-4, circuit, force_of, hold)
+    assert np.abs(found - expected).max() < bound * np.ptp(expected)
+
+
+@pytest.mark.parametrize("hold", ["linear", "zero"])
+@pytest.mark.parametrize(
+    "further",
+    [
+        {"elastic_coupling:motor": {"stiffness_N_per_m": 44e3, "motor_share": 0.3}},
+        {
+            "second_mode": {
+                "mass_kg": 3e-3,
+                "frequency_Hz": 110.0,
+                "damping_ratio": 0.02,
+            }
+        },
+        {"asymmetric_friction": {"force_forward_N": 1.0, "force_backward_N": 1.6}},
+        {"load_friction:drive": {"force_N": 0.6, "load_share": 0.08}},
+    ],
+)
+def test_bodies_and_friction_behind_a_fast_coil_are_those_of_short_samples(
+    further, hold
+):
+    """A sample in sixteen parts asks for steps as short as the coil is fast."""
+    voltage = np.repeat(np.random.default_rng(6).uniform(-12, 12, 8), 10)
+    effects = {"cubic_stiffness": {"stiffness_N_per_m3": 4e7}} | further
+    coil = {"inductance_H": 3.5e-4, "resistance_ohm": 5.6, "hold": hold}
+    drive = Drive(
+        mass_kg=0.028,
+        damping_N_s_per_m=1.6,
+        stiffness_N_per_m=2200.0,
+        force_constant_N_per_A=8.2,
+        effects=effects,
+        **coil,
+    )
+    found = simulate_drive(voltage, drive, sample_time_s=5e-4).output
+    fine = np.repeat(voltage, 16)
+    if hold == "linear":
+        fine = np.interp(np.arange(79 * 16 + 1) / 16, np.arange(80), voltage)
+    expected = simulate_drive(fine, drive, sample_time_s=5e-4 / 16).output[::16]
     assert np.abs(found - expected).max() < 1e-5 * np.ptp(expected)
 
 

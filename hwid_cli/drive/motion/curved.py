@@ -34,6 +34,7 @@ from hwid_cli.drive.motion.state import (
     MOTOR_X,
     N_STATE,
     PART_V,
+    PART_X,
     TURNED_AT,
     WAY,
     V,
@@ -73,19 +74,32 @@ def is_always_curved(p: np.ndarray) -> bool:
 
 
 @compiled(**INNER)
-def has_plain_winding(p: np.ndarray) -> bool:
-    """Return whether a winding's current acts on the mass alone, without losses or limits.
+def is_wound(p: np.ndarray) -> bool:
+    """Return whether a winding's fast part is followed exactly.
 
-    Then its fast part is followed exactly, and steps need not be as short as it is fast.
+    Then steps need not be as short as it is fast; beside a limit they have to.
 
     Parameters
     ----------
     p : ndarray, shape (N_SLOTS,)
     """
-    is_alone = p[slots.GEAR_STIFFNESS] == 0.0 and p[slots.MODE_MASS] == 0.0
-    is_plain = p[slots.DRIVE_VARIES] == 0.0 and p[slots.CLIP_LIMIT] == np.inf
     is_winding = p[slots.RESISTANCE] > 0.0 and p[slots.INDUCTANCE] > 0.0
-    return is_alone and is_plain and is_winding and not has_losses(p)
+    return is_winding and p[slots.CLIP_LIMIT] == np.inf
+
+
+@compiled(**INNER)
+def slow_pace(fast: float, phase: float, p: np.ndarray) -> float:
+    """Return at which rate a winding is looked at that settles at another one, [1/s].
+
+    Parameters
+    ----------
+    fast : float, [1/s]
+        Rate at which it settles.
+    phase : float, [rad]
+        By which a step may turn at most.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return min(fast, WINDING_STEPS * phase / p[slots.SAMPLE_TIME])
 
 
 @compiled(**INNER)
@@ -237,8 +251,8 @@ def step_limit(
         rate += np.sqrt(p[slots.MODE_STIFFNESS] * both) + p[slots.MODE_DAMPING] * both
     if p[slots.INDUCTANCE] > 0.0:
         fast = p[slots.RESISTANCE] / p[slots.INDUCTANCE]
-        if has_plain_winding(p):
-            fast = min(fast, WINDING_STEPS * LONGEST_PHASE / p[slots.SAMPLE_TIME])
+        if is_wound(p):
+            fast = _rate_of_winding(fast, state, memory, push, done, p)
         rate += fast
     if p[slots.HYSTERESIS_FORCE] != 0.0:
         rate += _rate_of_yielding(state, memory, mass, p)
@@ -253,6 +267,35 @@ def step_limit(
         pull = abs(acceleration(state, memory, push, done, p)[0])
         rate += abs(p[slots.STATIC_EXCESS]) / (mass * slow) + 0.5 * pull / slow
     return LONGEST_PHASE / max(rate, 1e-9)
+
+
+@compiled(**INNER)
+def _rate_of_winding(
+    fast: float,
+    state: np.ndarray,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    p: np.ndarray,
+) -> float:
+    """Return how fast a current has to be followed that settles at the rate ``fast``.
+
+    Where its force is no constant times it, what has not settled yet decides that.
+    """
+    slow = slow_pace(fast, LONGEST_PHASE, p)
+    if slow == fast or (p[slots.DRIVE_VARIES] == 0.0 and not has_losses(p)):
+        return slow
+    has_motor = p[slots.GEAR_STIFFNESS] > 0.0
+    speed = state[MOTOR_V] if has_motor else state[V]
+    gain, motor, _, _ = acceleration(state, memory, push, done, p)
+    value, trend, _, _ = shift(push, DRIVE, done)
+    across = value - p[slots.BACK_EMF] * speed
+    trend -= p[slots.BACK_EMF] * (motor if has_motor else gain)
+    drop = p[slots.RESISTANCE] * state[CIRCUIT]
+    # What it is behind a voltage that changes evenly, it stays behind.
+    unsettled = abs(drop - across + trend / fast)
+    share = unsettled / max(abs(drop) + abs(across), 1e-300)
+    return max(slow, fast * np.sqrt(np.sqrt(min(share, 1.0))))
 
 
 @compiled(**INNER)
@@ -511,7 +554,7 @@ def step_all(
     if p[slots.MODE_MASS] == 0.0 and not depends_on_motion(p):
         _step_coupled(state, trial, memory, push, done, h, is_held, p)
         return
-    if has_plain_winding(p):
+    if is_wound(p):
         _step_wound(state, trial, memory, push, done, h, is_held, p)
         return
     total, slope = np.zeros(N_STATE), np.empty(N_STATE)
@@ -581,61 +624,70 @@ def _step_wound(
     is_held: bool,
     p: np.ndarray,
 ) -> None:
-    """Step of a mass behind a winding, however fast its current settles.
+    """Step of a drive behind a winding, however fast its current settles.
 
     The current takes an exponential Runge-Kutta step (ETDRK4: Cox, Matthews 2002); in
-    place of position and velocity their sums with the current are followed, which its
-    fast part does not push. docs/method_diagnosis.md, eq. (D7a).
+    place of position and velocity of what it drives their sums with the current are
+    followed, which its fast part does not push. docs/method_diagnosis.md, eq. (D7a).
     """
     pace = p[slots.RESISTANCE] / p[slots.INDUCTANCE]
-    gain = p[slots.FORCE_CONSTANT] / (pace * p[slots.MASS])
-    i0 = state[CIRCUIT]
-    x0, v0 = state[X] - gain / pace * i0, state[V] + gain * i0
+    of_mass, of_motor = _pushed_by_current(pace, is_held, p)
     half, half1, _, _ = _fading(0.5 * pace * h)
     whole, whole1, whole2, whole3 = _fading(pace * h)
     half1 *= 0.5 * h
-    x, v, i, rate0 = x0, v0, i0, 0.0
-    before = rate = di = dx = dv = 0.0
-    for stage in range(4):
-        after, weight, way = runge_kutta_stage(stage, h)
-        at = done + after
-        position, velocity = x + gain / pace * i, v - gain * i
-        if is_held:
-            position, velocity = state[X], 0.0
-        across = value_of(push, DRIVE, at) - p[slots.BACK_EMF] * velocity
-        net = value_of(push, OTHER, at) - resisting(position, velocity, memory, p)
-        if p[slots.OWN_FORCE] != 0.0:
-            net += own_force(position, velocity, memory[WAY], push, at, p)
-        drawn = across / p[slots.RESISTANCE]
-        rate = across / p[slots.INDUCTANCE]
-        slope = v - gain * drawn
-        turn = (net + p[slots.FORCE_CONSTANT] * drawn) / p[slots.MASS]
-        dx += weight * slope
-        dv += weight * turn
-        x, v = x0 + way * slope, v0 + way * turn
-        if stage == 0:
-            rate0 = rate
-            di += (whole1 - 3.0 * whole2 + 4.0 * whole3) * rate
-            i = half * i0 + half1 * rate
-            before = i
-        elif stage == 1:
-            di += 2.0 * (whole2 - 2.0 * whole3) * rate
-            i = half * i0 + half1 * rate
-        elif stage == 2:
-            di += 2.0 * (whole2 - 2.0 * whole3) * rate
-            i = half * before + half1 * (2.0 * rate - rate0)
-        else:
-            di += (4.0 * whole3 - whole2) * rate
+    outer, inner = whole1 - 3.0 * whole2 + 4.0 * whole3, 2.0 * (whole2 - 2.0 * whole3)
+    i0 = i = first = state[CIRCUIT]
+    x0, v0 = state[X] - of_mass / pace * i, state[V] + of_mass * i
+    xm0, vm0 = state[MOTOR_X] - of_motor / pace * i, state[MOTOR_V] + of_motor * i
+    di = dx = dv = dxm = dvm = dxp = dvp = rate0 = 0.0
     for n in range(N_STATE):
         trial[n] = state[n]
-    i = whole * i0 + h * di
-    trial[CIRCUIT] = i
-    if not is_held:
-        sixth = h / 6.0
-        trial[X] = x0 + sixth * dx + gain / pace * i
-        trial[V] = v0 + sixth * dv - gain * i
-    # A motor that is part of the mass.
-    trial[MOTOR_X], trial[MOTOR_V] = trial[X], trial[V]
+    for stage in range(4):
+        after, weight, way = runge_kutta_stage(stage, h)
+        a, am, ap, rise = acceleration(trial, memory, push, done + after, p)
+        rate = rise + pace * i
+        a, am = a + of_mass * rise, am + of_motor * rise
+        v, vp = trial[V] - of_mass / pace * rise, trial[PART_V]
+        vm = trial[MOTOR_V] - of_motor / pace * rise
+        if is_held:
+            v = a = 0.0
+        dx, dv, dxm = dx + weight * v, dv + weight * a, dxm + weight * vm
+        dvm, dxp, dvp = dvm + weight * am, dxp + weight * vp, dvp + weight * ap
+        if stage == 0:
+            rate0, di = rate, outer * rate
+            i = first = half * i0 + half1 * rate
+        elif stage == 1:
+            di += inner * rate
+            i = half * i0 + half1 * rate
+        elif stage == 2:
+            di += inner * rate
+            i = half * first + half1 * (2.0 * rate - rate0)
+        else:
+            i = whole * i0 + h * (di + (4.0 * whole3 - whole2) * rate)
+            way, v, a, vm, am, vp, ap = h / 6.0, dx, dv, dxm, dvm, dxp, dvp
+        trial[CIRCUIT] = i
+        trial[X], trial[V] = (
+            x0 + way * v + of_mass / pace * i,
+            v0 + way * a - of_mass * i,
+        )
+        trial[MOTOR_X] = xm0 + way * vm + of_motor / pace * i
+        trial[MOTOR_V] = vm0 + way * am - of_motor * i
+        trial[PART_X] = state[PART_X] + way * vp
+        trial[PART_V] = state[PART_V] + way * ap
+    if of_motor == 0.0:
+        # A motor that is part of the mass.
+        trial[MOTOR_X], trial[MOTOR_V] = trial[X], trial[V]
+
+
+@compiled(**INNER)
+def _pushed_by_current(
+    pace: float, is_held: bool, p: np.ndarray
+) -> tuple[float, float]:
+    """Return the speed that an ampere that dies away gives the mass, and the motor."""
+    if p[slots.GEAR_STIFFNESS] > 0.0:
+        motor = p[slots.MASS] * p[slots.MOTOR_SHARE]
+        return 0.0, p[slots.FORCE_CONSTANT] / (pace * motor)
+    return 0.0 if is_held else p[slots.FORCE_CONSTANT] / (pace * p[slots.MASS]), 0.0
 
 
 @compiled(**INNER)

@@ -57,6 +57,17 @@ def steady_force(memory: np.ndarray, p: np.ndarray) -> float:
 
 
 @compiled(**INNER)
+def stays(p: np.ndarray) -> bool:
+    """Return whether nothing curved goes on in a drive whose mass is held.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return p[slots.GEAR_STIFFNESS] == 0.0
+
+
+@compiled(**INNER)
 def set_inputs(
     inputs: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
 ) -> None:
@@ -117,7 +128,9 @@ def advance(
     if is_held and not has_inner:
         trial[X], trial[V] = state[X], state[V]
         return
-    if is_curved_at_times and not is_curved:
+    if is_held and stays(p):
+        is_curved = False
+    elif is_curved_at_times and not is_curved:
         is_curved = is_curved_here(state, memory, p)
     if not is_curved:
         set_inputs(inputs, memory, push, done, p)

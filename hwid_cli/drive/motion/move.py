@@ -14,7 +14,12 @@ from hwid_cli.drive import slots
 from hwid_cli.drive.command import MOST_PIECES, static_command
 from hwid_cli.drive.controller import N_CONTROL, controlled, is_closed
 from hwid_cli.drive.motion.corners import corner_of, count_edges
-from hwid_cli.drive.motion.curved import is_always_curved, step_limit
+from hwid_cli.drive.motion.curved import (
+    is_always_curved,
+    is_wound,
+    slow_pace,
+    step_limit,
+)
 from hwid_cli.drive.motion.events import (
     EDGE,
     LEAVING,
@@ -24,6 +29,7 @@ from hwid_cli.drive.motion.events import (
     excess,
     pass_zero,
     set_off,
+    stays,
     stop,
     time_of,
 )
@@ -92,7 +98,7 @@ def move(
     followed = _start(state, memory, before, at_start, sample_time, p)
     trial, inputs, active = state.copy(), np.zeros(N_INPUT), active_states(p)
     kind = _kind_of(p)
-    step = _longest_step(sample_time, kind)
+    step = _longest_step(sample_time, kind, p)
     matrices, lengths = _make_room(sample_time, step, p)
     # Pieces are listed for many samples at once, or for one after the other where the
     # command or the temperature depends on the motion.
@@ -180,12 +186,18 @@ def _kind_of(p: np.ndarray) -> tuple[bool, bool, bool, bool, bool, float]:
 
 @compiled(**INNER)
 def _longest_step(
-    sample_time: float, kind: tuple[bool, bool, bool, bool, bool, float]
+    sample_time: float,
+    kind: tuple[bool, bool, bool, bool, bool, float],
+    p: np.ndarray,
 ) -> float:
     """Return the longest step of linear motion, a whole part of a sample."""
     _, has_edges, _, is_watched, _, rate = kind
     count = 1.0
     if has_edges or is_watched:
+        if is_wound(p):
+            # What settles does not go there and back.
+            fast = p[slots.RESISTANCE] / p[slots.INDUCTANCE]
+            rate += slow_pace(fast, LONGEST_PHASE, p) - fast
         count = np.ceil(sample_time * rate / LONGEST_PHASE)
         count = min(max(count, 1.0), MOST_STEPS)
     return sample_time / count
@@ -343,7 +355,7 @@ def _move_piece(
                     corner = corner_of(state, value_of(push, DRIVE, done), p)
                 is_held = False
                 events += 1
-        if is_curved or is_curved_at_times:
+        if (is_curved or is_curved_at_times) and not (is_held and stays(p)):
             limit = step_limit(state, memory, push, done, p)
             limit = max(limit, length / MOST_STEPS)
             if limit < h:
