@@ -18,6 +18,8 @@ MISSING_WORDS = frozenset(
         # Spreadsheets, in English and German.
         *("#n/a", "#nv", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#null!"),
         *("#ref!", "#bezug!", "#name?"),
+        # Out of an oscilloscope's range.
+        *("∞", "+∞", "-∞"),
         # The library of C under Windows.
         *("1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "nan(ind)", "-nan(ind)"),
     ]

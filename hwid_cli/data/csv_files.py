@@ -55,6 +55,11 @@ _MOST_TORN = 0.02
 # The csv module reads no longer cell, and says so.
 _LONGEST_LINE = 2**16
 _READ_BYTES = 2**20
+# A value behind its name, in every row: u=0.5, or u:0.5 as small controllers print it.
+_NAME_OF_VALUE = r"[^\W\d]\w*(?=[ ]*[:=])"
+_NAMED_VALUE = rf"{_NAME_OF_VALUE}[ ]*[:=][ ]*[-+]?[.\d][^\s,;:=]*"
+_NAMED_VALUES = re.compile(rf"\s*{_NAMED_VALUE}(?:[ ]*[,;\t ][ ]*{_NAMED_VALUE})+\s*")
+_NAMES_OF_VALUES = re.compile(rf"(?<![^\s,;])({_NAME_OF_VALUE})[ ]*[:=][ ]*")
 _QUOTED_OR_BARE = re.compile(r'"([^"]*)"|([^\s"]+)')
 
 
@@ -70,6 +75,8 @@ class _Sheet:
         Line in which each of them ends.
     width : int
         Cells in the row of names, else in the first row of numbers.
+    is_named : bool
+        Whether each value stands behind its name.
     """
 
     path: Path
@@ -79,6 +86,7 @@ class _Sheet:
     lines: list[int]
     head: TableHead
     width: int
+    is_named: bool = False
 
     @property
     def first_line(self) -> int:
@@ -178,6 +186,8 @@ def _read_sheet(path: Path, wanted: Sequence[str]) -> _Sheet:
 
 def _form_of(path: Path, lines: list[str], wanted: Sequence[str]) -> _Sheet:
     """Form of a file that begins with some lines."""
+    names = _names_of_values(lines)
+    lines = _without_names(lines) if names else lines
     separator = _separator(lines)
     rows, ends, comments = _rows(path, lines, separator)
     if not any(any(row) for number, row in enumerate(rows) if number not in comments):
@@ -186,9 +196,29 @@ def _form_of(path: Path, lines: list[str], wanted: Sequence[str]) -> _Sheet:
             "export the measurement again or leave the file out"
         )
     head = read_head(rows, wanted=wanted, comments=comments)
+    if names:
+        head = replace(head, names=names, name_row=-1)
     place = head.name_row if head.name_row >= 0 else min(head.body, len(rows) - 1)
     width = max(len(rows[place]), len(head.names))
-    return _Sheet(path, "", separator, rows, ends, head, width)
+    return _Sheet(path, "", separator, rows, ends, head, width, bool(names))
+
+
+def _names_of_values(lines: Sequence[str]) -> tuple[str, ...]:
+    """Names that stand in front of the values of most rows; none where they do not."""
+    filled = [line for line in lines if line.strip()]
+    lower = filled[len(filled) // 2 :]
+    named = [line for line in lower if _NAMED_VALUES.fullmatch(line)]
+    if not named or 2 * len(named) < len(lower):
+        return ()
+    return tuple(_NAMES_OF_VALUES.findall(named[0]))
+
+
+def _without_names(lines: Sequence[str]) -> list[str]:
+    """Lines without the names in front of their values."""
+    return [
+        _NAMES_OF_VALUES.sub("", line) if _NAMED_VALUES.fullmatch(line) else line
+        for line in lines
+    ]
 
 
 def _telling(lines: list[str]) -> list[str]:
@@ -401,6 +431,8 @@ def _read_body(
         for _ in islice(file, number):
             pass
         while lines := list(islice(file, _BLOCK_LINES)):
+            if sheet.is_named:
+                lines = _without_names(lines)
             plain = _add_plain(sheet, lines, parts, number)
             number += plain
             lines = lines[plain:]
@@ -409,13 +441,22 @@ def _read_body(
             source = _Counted(lines, file)
             rows = _cells_of(sheet.path, source, sheet.separator, number)
             inside = _while_inside(rows, number + len(lines))
-            block = [(end, row) for end, row in inside if row[0] not in begins]
+            block = [
+                (end, row)
+                for end, row in inside
+                if row[0] not in begins and (keep_heads or not _is_title(row, sheet))
+            ]
             _check_widths(sheet, block)
             is_cut = not lines[-1].endswith(("\n", "\r"))
             whole = _without_cut_row(block, sheet.width) if is_cut else block
             parts.add_cells(_without_torn_cells(whole, sheet.width))
             number += source.count
     return parts.columns()
+
+
+def _is_title(row: Sequence[str], sheet: _Sheet) -> bool:
+    """Whether a row between numbers is the title of those below it."""
+    return len(row) == 1 < sheet.width and is_word(row[0])
 
 
 def _without_cut_row(

@@ -56,6 +56,8 @@ _INTERVAL_WORDS = frozenset(
         *("wfincrement", "stepsize", "tinterval", "hresolution"),
     ]
 )
+# These say a sample time where a unit of time stands behind the number.
+_MAYBE_INTERVAL_WORDS = frozenset(("resolution", "auflösung", "period", "periode"))
 _RATE_WORDS = frozenset(
     [
         *("fs", "samplerate", "samplingrate", "samplingfrequency", "samplefrequency"),
@@ -148,7 +150,8 @@ def sample_time_named(title: str, value: float, unit: str = "") -> float | None:
         return None
     in_time = factor_between(said, "s") if said else None
     # What a rate says may stand as its interval already.
-    if word in _INTERVAL_WORDS or (word in _RATE_WORDS and in_time is not None):
+    of_time = _RATE_WORDS | _MAYBE_INTERVAL_WORDS
+    if word in _INTERVAL_WORDS or (word in of_time and in_time is not None):
         factor = in_time if said else 1.0
         return None if factor is None else float(f"{value * factor:.12g}")
     if word in _RATE_WORDS:
@@ -211,6 +214,8 @@ def read_head(
     # A comment of fewer cells says something else.
     width = max(numeric, default=-1) + 1
     noted = [n for n in range(body) if n in comments and len(rows[n]) >= width]
+    # A title may have more words than there are columns.
+    noted = [n for n in noted if len(rows[n]) == width] or noted
     asked = [n for n in (*plain[::-1], *noted[::-1]) if set(wanted) <= set(rows[n])]
     units: dict[int, str] = {}
     name_row, names = -1, []
@@ -225,6 +230,8 @@ def read_head(
         names = _named(rows, name_row, numeric, units)
         if not units and _are_rows_named(rows[body:], len(names)):
             names = ["", *names]
+    if names and not units and not any(split_unit(one)[1] for one in names):
+        units = _units_above(rows[:name_row], numeric)
     said = _said_of(rows[:body], names)
     for place, text in said.items():
         if place in numeric and (unit := split_unit(text)[1]):
@@ -366,6 +373,8 @@ def _name_row(
         # A word for time in front of each pair is the name of its clock.
         is_about &= 0 not in numeric or key not in _TIME_WORDS
         is_about |= key in _OTHER_WORDS | _SCALE_WORDS or _is_title(row)
+        # The same setting of all columns is no name.
+        is_about |= len(set(cells[1:])) == 1 and bool(_SAID.fullmatch(cells[-1]))
         states_clock = key in _INTERVAL_WORDS | _RATE_WORDS
         is_about |= states_clock and all(map(is_quantity, filter(None, row[1:])))
         if key in _UNIT_WORDS:
@@ -399,6 +408,18 @@ def _stated_units(
         if _letters(next((cell for cell in row if cell), "")) in _UNIT_WORDS:
             found |= _units_of(row, numeric)
     return found
+
+
+def _units_above(
+    above: Sequence[Sequence[str]], numeric: Sequence[int]
+) -> dict[int, str]:
+    """Units in brackets behind other names of most columns, further up."""
+    for row in reversed(above):
+        cells = dict(zip(numeric, _cells(row, numeric), strict=True))
+        found = {n: unit for n, cell in cells.items() if (unit := split_unit(cell)[1])}
+        if 2 * len(found) > len(numeric):
+            return found
+    return {}
 
 
 def _named(

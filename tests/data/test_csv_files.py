@@ -331,3 +331,42 @@ def test_a_row_that_is_torn_in_the_last_column_wanted_has_no_number_there(read):
     assert np.isnan(y[120])
     assert u[120] == 120
     assert np.isfinite(np.delete(y, 120)).all()
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "t={},u={},y={}",
+        "t:{}\tu:{}\ty:{}",
+        "t: {} u: {} y: {}",
+        "t = {}; u = {}; y = {}",
+    ],
+)
+def test_a_value_may_stand_behind_its_name_in_every_row(read, row):
+    rows = [row.format(0.5 * n, 1 + n, -n - 0.25) for n in range(60)]
+    t, u, y = read("\n".join(["ready.", *rows]) + "\n")
+    np.testing.assert_array_equal(t, 0.5 * np.arange(60))
+    np.testing.assert_array_equal(u, 1 + np.arange(60))
+    np.testing.assert_array_equal(y, -0.25 - np.arange(60))
+
+
+def test_times_of_day_are_no_names_of_values(tmp_path):
+    rows = [f"12:00:{n:02d};{n};{n * n}" for n in range(60)]
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(["t;u;y", *rows]) + "\n")
+    assert [one.title for one in list_columns(path)] == ["t", "u", "y"]
+
+
+def test_titles_between_blocks_are_no_rows(read):
+    block = [f"{0.5 * n:g} {n} {3 * n}" for n in range(30)]
+    text = "\n".join(["# t u y", '"run 1"', *block, "", "", '"run 2"', *block])
+    t, u, _ = read(text + "\n")
+    np.testing.assert_array_equal(t, np.r_[0.5 * np.arange(30), 0.5 * np.arange(30)])
+    assert np.isfinite(u).all()
+
+
+def test_what_is_beyond_an_oscilloscopes_range_is_no_number(read):
+    rows = [f"{n};{n / 8};{n}".replace(".", ",") for n in range(60)]
+    rows[30] = "30;∞;30"
+    _, u, _ = read("\n".join(["t;u;y", *rows]) + "\n")
+    assert np.flatnonzero(np.isnan(u)).tolist() == [30]

@@ -142,3 +142,31 @@ def test_dates_of_a_preamble_are_no_rows_of_the_table():
     head = read_head(rows)
     assert head.body == 3
     assert head.names[2:] == ("Time", "Position", "Torque")
+
+
+@pytest.mark.parametrize(
+    ("date", "names"),
+    [
+        ("Datum", ("Load cell U9C", "Gauge WA50")),
+        ("Date", ("MX840_CH 1 [N]", "MX840_CH 2 [mm]")),
+    ],
+)
+def test_names_may_stand_further_up_or_down_than_their_units(date, names):
+    found = head(
+        ["Time 1 [s]", "MX840_CH 1 [N]", "MX840_CH 2 [mm]"],
+        ["SR: 300 Hz", "Type: Float 4", "Type: Float 4"],
+        [f"{date}: 11.03.2024", "Load cell U9C", "Gauge WA50"],
+    )
+    assert found.names[1:] == names
+    assert date == "Date" or found.units == {0: "s", 1: "N", 2: "mm"}
+
+
+def test_of_comments_the_one_of_as_many_cells_as_columns_names_them():
+    rows = [["t(s)", "u(V)", "x(cm)"], ["step", "response,", "amplitude", "0"], *BODY]
+    assert read_head(rows, comments={0, 1}).names == ("t(s)", "u(V)", "x(cm)")
+
+
+def test_a_resolution_is_a_sample_time_only_in_a_unit_of_time():
+    assert sample_time_named("Resolution", 250.0, "us") == pytest.approx(250e-6)
+    assert sample_time_named("Resolution", 12.0, "bit") is None
+    assert sample_time_named("Resolution", 12.0) is None
