@@ -61,6 +61,8 @@ WITHIN_BEST = 1.1
 
 # A base parameter that the re-fit changes by this factor or more is bent.
 BENT = 2.0
+# What is left of an effect of the simulation in a start, at least, of what it states.
+_LEAST_LEFT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -465,10 +467,13 @@ def with_input_noise(
     return found if found.cause == "input_noise" else fit
 
 
-def fitted_start(
+def present_start(
     found: CandidateFit, present: dict[str, dict[str, float]]
 ) -> dict[str, dict[str, float]]:
-    """Effects that the simulation has, with their fitted values.
+    """Effects that the simulation has, as a fit has left them, as a start.
+
+    One that has vanished beside what was missing comes back: where it is nothing, no
+    search sees what it would do.
 
     Parameters
     ----------
@@ -476,7 +481,19 @@ def fitted_start(
         Effects of the simulation with the values that it gives.
     """
     values = _values_by_owner(found)
-    return {name: {**given, **values.get(name, {})} for name, given in present.items()}
+    return {
+        name: {
+            parameter: _seen(values.get(name, {}).get(parameter, stated), stated)
+            for parameter, stated in given.items()
+        }
+        for name, given in present.items()
+    }
+
+
+def _seen(value: float, stated: float) -> float:
+    """A value, or a share of the stated one where hardly anything is left of that."""
+    least = _LEAST_LEFT * stated
+    return least if 0.0 <= value / (least or 1.0) < 1.0 else value
 
 
 def fitted_effects(found: CandidateFit) -> dict[str, dict[str, float]]:
@@ -499,7 +516,16 @@ def fitted_values(
     found: CandidateFit, present: dict[str, dict[str, float]]
 ) -> dict[str, dict[str, float]]:
     """Shared parameters of all effects of a fit, those of the simulation included."""
-    return {**fitted_start(found, present), **fitted_effects(found)}
+    values = _values_by_owner(found)
+    given = {name: {**one, **values.get(name, {})} for name, one in present.items()}
+    return {**given, **fitted_effects(found)}
+
+
+def start_values(
+    found: CandidateFit, present: dict[str, dict[str, float]]
+) -> dict[str, dict[str, float]]:
+    """The same as a start, with what the simulation has and the fit has lost."""
+    return {**present_start(found, present), **fitted_effects(found)}
 
 
 def start_from(drive: Drive, found: CandidateFit) -> SearchStart:
@@ -510,7 +536,7 @@ def start_from(drive: Drive, found: CandidateFit) -> SearchStart:
     drive : Drive
         That was fitted, with the effects that the simulation has.
     """
-    values = fitted_values(found, drive_effects(drive))
+    values = start_values(found, drive_effects(drive))
     return SearchStart(base_of(fitted_drive(drive, found)), values)
 
 

@@ -19,7 +19,7 @@ from hwid_cli.diagnosis.candidate import (
     base_of,
     fit_candidate,
     fitted_drive,
-    fitted_start,
+    present_start,
     start_from,
 )
 from hwid_cli.diagnosis.intervals import intervals, unclear_effects
@@ -272,7 +272,7 @@ def _as_effect(
             acts_on, weights = "input", weights / base["force_constant_N_per_A"]
     effect, values = _effect(terms, weights, acts_on, _units(rounds))
     identifier = own_id(_name(rounds), effect)
-    present = fitted_start(rounds.base, drive_effects(rounds.problem.drive))
+    present = present_start(rounds.base, drive_effects(rounds.problem.drive))
     start = SearchStart(base, {**present, identifier: values})
     return _Tried(columns, subset, terms, acts_on, identifier, start)
 
@@ -564,7 +564,7 @@ def _replaced(
             start[name] = value
     identifier = own_id(_name(rounds), effect)
     base = base_of(fitted_drive(rounds.problem.drive, _fit(one)))
-    present = fitted_start(rounds.base, drive_effects(rounds.problem.drive))
+    present = present_start(rounds.base, drive_effects(rounds.problem.drive))
     search = SearchStart(base, {**present, identifier: start})
     return replace(one, terms=terms, identifier=identifier, start=search, fit=None)
 
@@ -605,7 +605,7 @@ def _named(rounds: Rounds, one: _Tried, found: RoundsResult) -> CandidateFit | N
 def _fit_of(rounds: Rounds, one: _Tried, effects: tuple[str, ...]) -> CandidateFit:
     """Fit effects of the catalogue from their own starts, the base where the law has it."""
     base = base_of(fitted_drive(rounds.problem.drive, _fit(one)))
-    present = fitted_start(rounds.base, drive_effects(rounds.problem.drive))
+    present = present_start(rounds.base, drive_effects(rounds.problem.drive))
     scales, baseline = rounds.baseline.scales, rounds.baseline
     several = [CATALOGUE[effect].starts(scales) for effect in effects]
     most = max(len(starts) for starts in several)

@@ -11,8 +11,9 @@ from hwid_cli.diagnosis.candidate import (
     SearchStart,
     base_of,
     fitted_drive,
-    fitted_start,
     fitted_values,
+    present_start,
+    start_values,
 )
 from hwid_cli.diagnosis.effect_sets import (
     Effects,
@@ -103,9 +104,11 @@ class Proposals:
             count = SCREENED_STARTS if baseline.is_bent else 1
             for one in found:
                 pairs[one.effect] += [(given, values) for values in one.starts[:count]]
+        beside = start_values(parent, present)
         return {
             with_effect(parent.effects, effect): [
-                SearchStart(base, {**start, effect: values}) for base, values in several
+                SearchStart(base, {**beside, effect: values})
+                for base, values in several
             ]
             for effect, several in pairs.items()
         }
@@ -123,7 +126,7 @@ class Proposals:
     def _likely_pairs(self) -> Iterable[tuple[Effects, SearchStart]]:
         """Pairs that should explain much more than their better half."""
         found = {one.effect: one for one in self._forecasts}
-        present = fitted_start(
+        present = present_start(
             self.rounds.base, drive_effects(self.rounds.problem.drive)
         )
         base = base_of(self.rounds.baseline.drive)

@@ -13,8 +13,8 @@ from hwid_cli.diagnosis.candidate import (
     SearchStart,
     base_of,
     fitted_drive,
-    fitted_values,
     start_from,
+    start_values,
 )
 from hwid_cli.diagnosis.effect_sets import (
     Effects,
@@ -68,7 +68,7 @@ def _from_best(fits: SetFits, best: CandidateFit) -> dict[Effects, list[SearchSt
     """
     rounds, present = fits.rounds, drive_effects(fits.rounds.problem.drive)
     is_complete = rounds.criteria.is_complete(best)
-    values, base = fitted_values(best, present), _base_values(fits, best)
+    values, base = start_values(best, present), _base_values(fits, best)
     sets: dict[Effects, list[SearchStart]] = {}
     for effect in best.effects:
         others = tuple(one for one in best.effects if one != effect)
@@ -86,7 +86,7 @@ def _from_best(fits: SetFits, best: CandidateFit) -> dict[Effects, list[SearchSt
                 for one in given
             ]
             if here is not None:
-                starts.append(SearchStart(base, fitted_values(here, present)))
+                starts.append(SearchStart(base, start_values(here, present)))
             sets[ids] = fits.unless_tried(ids, starts)
     return sets
 
@@ -111,9 +111,9 @@ def _from_parts(fits: SetFits, size: int) -> Iterable[tuple[Effects, SearchStart
         if len(added) != 1:
             continue
         (effect,) = added
-        values = fitted_values(smaller, present)
+        values = start_values(smaller, present)
         faint = CATALOGUE[effect].faint(
-            fitted_values(one, present)[effect], rounds.baseline.scales
+            start_values(one, present)[effect], rounds.baseline.scales
         )
         yield (
             one.effects,
@@ -215,7 +215,7 @@ def _widened(
     rounds, present = fits.rounds, drive_effects(fits.rounds.problem.drive)
     for one in narrow:
         fit = fits.found[one]
-        values, base = fitted_values(fit, present), _base_values(fits, fit)
+        values, base = start_values(fit, present), _base_values(fits, fit)
         (more,), (less,) = set(ids) - set(one), set(one) - set(ids)
         given = translated(more, values[less], rounds.baseline.scales)
         for start in given:
@@ -227,7 +227,7 @@ def without_each(
 ) -> dict[Effects, list[SearchStart]]:
     """A set without each of its effects, from where the whole set ended."""
     present = drive_effects(fits.rounds.problem.drive)
-    values = fitted_values(whole, present)
+    values = start_values(whole, present)
     base = _base_values(fits, whole)
     sets: dict[Effects, list[SearchStart]] = {}
     for effect in whole.effects:

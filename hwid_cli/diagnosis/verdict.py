@@ -157,10 +157,10 @@ def _nameless(
     unclear: Callable[[CandidateFit], tuple[str, ...]],
 ) -> DiagnosisVerdict:
     """What is said where no set may be named: little is left, or several share it."""
-    is_close = criteria.ratio(base) <= CLOSE_TO_NOISE
-    if is_close and base.whiteness <= NEARLY_WHITE:
+    if criteria.ratio(base) <= CLOSE_TO_NOISE:
+        is_white = base.whiteness <= NEARLY_WHITE
         return DiagnosisVerdict(
-            _without_effect(criteria, given_sse, base), True, base, ()
+            _without_effect(criteria, given_sse, base), is_white, base, ()
         )
     explained = [
         criteria.evidence(one, base).explained for one in fits.values() if one.is_usable

@@ -10,7 +10,8 @@ from hwid_cli.diagnosis.candidate import (
     SCREENING_SAMPLES,
     fitted_drive,
     fitted_effects,
-    fitted_start,
+    fitted_values,
+    present_start,
     rebuilt,
     screen,
 )
@@ -369,7 +370,7 @@ def test_it_keeps_its_effects_and_marks_what_is_own(pushed):
 
 def test_effects_of_the_simulation_take_their_fitted_values(pushed):
     _, found = pushed
-    start = fitted_start(found, {"sensor_drift": {"drift_m_per_s": 0.008}})
+    start = present_start(found, {"sensor_drift": {"drift_m_per_s": 0.008}})
     assert set(start) == {"sensor_drift"}
     assert start["sensor_drift"]["drift_m_per_s"] == pytest.approx(0.01, rel=0.05)
 
@@ -379,3 +380,20 @@ def test_a_fit_of_the_base_alone_has_no_effects():
     found = fit(of)
     assert fitted_effects(found) == {}
     assert simulation().effects == {}
+
+
+@pytest.mark.parametrize(
+    ("share", "start"), [(1e-7, 0.1), (0.5, 0.5), (2.0, 2.0), (0.0, 0.1)]
+)
+def test_an_effect_of_the_simulation_that_has_vanished_comes_back(pushed, share, start):
+    """Friction that is gone beside what was missing: there no search sees it."""
+    _, found = pushed
+    fitted = fitted_effects(found)["sensor_drift"]["drift_m_per_s"]
+    stated = fitted / share if share else 0.008
+    if not share:
+        found = replace(found, values=np.zeros_like(found.values))
+    present = {"sensor_drift": {"drift_m_per_s": stated}}
+    begun = present_start(found, present)["sensor_drift"]["drift_m_per_s"]
+    assert begun == pytest.approx(start * stated)
+    exact = fitted_values(found, present)["sensor_drift"]["drift_m_per_s"]
+    assert exact == pytest.approx(share * stated)

@@ -733,6 +733,15 @@ def test_a_small_remainder_that_goes_with_no_effect_is_none_but_not_all(sse, whi
     assert (verdict.word, verdict.is_complete) == ("none", False)
 
 
+@pytest.mark.parametrize(("sse", "word"), [(105.0, "none"), (108.0, "unknown")])
+def test_a_quarter_of_the_noise_is_too_little_to_be_unknown(sse, word):
+    """An offset that drifts: some effect always takes a part of it."""
+    left = base(sse, whiteness=30.0)
+    weak = made_up(("cogging",), sse - 0.45 * (sse - 100.0), parameters=3)
+    verdict = decided(left, [weak], [weak], given=sse)
+    assert (verdict.word, verdict.is_complete) == (word, False)
+
+
 def test_there_is_a_word_for_every_case_and_no_other():
     words = {"named", "ambiguous", "law", "parameters", "unknown", "none"}
     assert set(VERDICTS) == words
