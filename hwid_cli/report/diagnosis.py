@@ -17,7 +17,7 @@ from hwid_cli.records.diagnosis import (
     Law,
     RankedCandidate,
 )
-from hwid_cli.records.drive import DriveResponse
+from hwid_cli.records.drive import BASE_AND_MASS, DriveResponse
 from hwid_cli.records.units import behind
 from hwid_cli.report.formats import MISSING, counted, decimals, listed, number
 from hwid_cli.report.table import Column, Heading, Table, Text, numbers, texts
@@ -132,6 +132,16 @@ def _told_as(
     )
 
 
+def _base_told_as(name: str) -> tuple[str, str]:
+    """Quantity of a parameter of the simulation, and its unit where the name tells it.
+
+    In a name of the user's ``flexure_N_m`` may be a torque or a spring.
+    """
+    quantity, unit = quantity_and_unit(name)
+    is_told = name in BASE_AND_MASS or " " not in unit or "/" in unit
+    return (quantity, unit) if is_told else (name, "-")
+
+
 def _interval(parameter: FittedParameter | BaseParameter) -> str:
     bounds = (parameter.low, parameter.high)
     if not np.isfinite(bounds).all():
@@ -209,7 +219,7 @@ def moved_parameters(diagnosis: Diagnosis) -> list[Moved]:
     """List the parameters of the simulation, the base first."""
     moved = [
         Moved(
-            *quantity_and_unit(one.name),
+            *_base_told_as(one.name),
             one.before,
             one.refitted,
             one.after,

@@ -6,6 +6,7 @@ import pytest
 
 from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.diagnosis import (
+    BaseParameter,
     FittedEffect,
     FittedParameter,
     Gap,
@@ -17,6 +18,7 @@ from hwid_cli.report.diagnosis import (
     diagnosis_blocks,
     effects_table,
     gap_table,
+    moved_parameters,
     quantity_and_unit,
     ranking_table,
     recordings_table,
@@ -363,3 +365,19 @@ def test_intervals_say_when_something_else_remains():
     words = "intervals hold as if nothing else were missing"
     assert words in effects_table(replace(named(), complete=False)).caption
     assert words not in effects_table(replace(named(), complete=True)).caption
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("flexure_N_m", ("flexure_N_m", "-")),
+        ("flexure_N_per_m", ("flexure", "N/m")),
+        ("coil_ohm", ("coil", "ohm")),
+        ("mass_kg", ("mass", "kg")),
+        ("gain", ("gain", "-")),
+    ],
+)
+def test_a_name_of_the_users_says_its_unit_only_where_it_can_mean_one(name, told):
+    found = replace(named(), base=(BaseParameter(name, 1.0, 2.0, 2.0),))
+    one = moved_parameters(found)[0]
+    assert (one.quantity, one.unit) == told
