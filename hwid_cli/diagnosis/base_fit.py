@@ -13,10 +13,12 @@ from hwid_cli.diagnosis.candidate import (
     base_of,
     compared_with_fit,
     fit_candidate,
+    start_from,
     with_input_noise,
 )
 from hwid_cli.diagnosis.direction import ReversedInputError, find_reversal
 from hwid_cli.diagnosis.growing import fit_grown, grown_starts, is_rugged
+from hwid_cli.diagnosis.late_input import with_earlier_input
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.parameters import compare_at, first_point, parameter_layout
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
@@ -27,6 +29,7 @@ from hwid_cli.diagnosis.scales import (
     scales_of_recordings,
 )
 from hwid_cli.diagnosis.search import fit_own
+from hwid_cli.diagnosis.through_pieces import fit_through_pieces
 from hwid_cli.diagnosis.zeros import with_zeros
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
@@ -37,6 +40,10 @@ from hwid_cli.records.diagnosis import NoiseFloor
 LINE_SHARE = 0.3
 # What a fit leaves is at least this share of the noise: it has few parameters.
 _LEAST_OF_NOISE = 0.5
+
+
+# Parameters of what repeats along the way or in time: each has many minima.
+_REPEATS = {"period_m", "per_turn", "frequency_Hz"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +87,8 @@ def fitted_base(problem: DiagnosisProblem) -> FittedBase:
         raise ReversedInputError(reversal)
     base = with_input_noise(problem, base, scales, noise)
     problem, base = with_zeros(problem, base, scales, noise)
-    if base.cause == "zeros":
+    problem, base = with_earlier_input(problem, base, scales, noise)
+    if base.cause in ("zeros", "late_input"):
         given = compared_as_given(problem)
     if base.is_usable:
         scales = scales_of_fit(problem, base, scales, noise)
@@ -108,6 +116,16 @@ def _refit_base(
     present = drive_effects(problem.drive)
     start = SearchStart(base_of(problem.drive), present)
     found = fit_candidate(problem, (), [start], scales, noise)
+    if found.whiteness <= 1.0:
+        return found
+    waves = {name: one for name, one in present.items() if _REPEATS & set(one)}
+    if waves and found.is_usable:
+        # While the base was far off, a period has gone astray.
+        end = start_from(problem.drive, found)
+        back = replace(end, effects={**end.effects, **waves})
+        again = fit_candidate(problem, (), [back], scales, noise)
+        found = min((found, again), key=lambda one: float(one.sse.sum()))
+    found = fit_through_pieces(problem, found, scales, noise)
     if not is_rugged(tuple(present)) or found.whiteness <= 1.0:
         return found
     starts = grown_starts(start, tuple(present), scales)

@@ -26,6 +26,8 @@ QUANTILE = 1.96
 # Share of the best determined direction below which one counts as undetermined.
 _DETERMINED = 1e-12
 # Difference for derivatives of an effect's size, in coordinates.
+# A strength that is so near its bound would go farther, [-].
+_AT_BOUND = 0.999
 _STEP = 1e-4
 
 
@@ -35,7 +37,7 @@ def unclear_effects(
     """Effects of a fit that may as well not be there, or be a simpler one.
 
     The interval of an effect's strength reaches zero, or that of the parameter that tells
-    it from what it contains.
+    it from what it contains; or its strength went as far as it may: it imitates.
 
     Returns
     -------
@@ -50,6 +52,10 @@ def unclear_effects(
     def is_clear(ref: ParameterRef) -> bool:
         column = found.names.index(ref)
         unknown, q = fit_layout.shared[column], point.shared[column]
+        if abs(unknown.value(q)) >= _AT_BOUND * max(
+            abs(unknown.low), abs(unknown.high)
+        ):
+            return False
         reach = spread.reach(_direction_of_size(ref, fit_layout, point, scales))
         # Of a logarithm linearised: a relative deviation of the value itself.
         return reach < 1.0 if unknown.is_log else bool(abs(q) > reach)

@@ -451,7 +451,8 @@ def held_out_names(recordings: Sequence[Recording]) -> tuple[str, ...]:
     Within each kind of recording, amplitudes and speeds of change are numbered; a
     recording is held out where the sum of its two numbers is a multiple of three, so
     that every amplitude and every speed is on both sides where the plan is a table. Of few
-    recordings chance may choose most; at most half are held out.
+    recordings chance may choose most; at most half are held out. Of recordings that are
+    each of a kind of their own it would choose one; at least a quarter are held out.
 
     Returns
     -------
@@ -473,7 +474,8 @@ def held_out_names(recordings: Sequence[Recording]) -> tuple[str, ...]:
             chosen |= _of_kind(members)
     if not chosen and len(recordings) > 1:
         chosen = {recordings[-1].name}
-    chosen = _at_most_half(recordings, _without_extremes(recordings, chosen))
+    kept = _at_most_half(recordings, _without_extremes(recordings, chosen))
+    chosen = _at_least_a_quarter(recordings, kept) or chosen
     return tuple(one.name for one in recordings if one.name in chosen)
 
 
@@ -489,7 +491,7 @@ def _without_extremes(recordings: Sequence[Recording], chosen: set[str]) -> set[
         reached = [name for name in sizes if sizes[name] >= _NEARLY * largest]
         if largest > 0 and all(name in held_out for name in reached):
             held_out.discard(max(sizes, key=lambda name: sizes[name]))
-    return held_out or chosen
+    return held_out
 
 
 def _at_most_half(recordings: Sequence[Recording], chosen: set[str]) -> set[str]:
@@ -501,6 +503,30 @@ def _at_most_half(recordings: Sequence[Recording], chosen: set[str]) -> set[str]
     by_size = sorted(ones, key=lambda one: float(np.max(np.abs(one.input))))
     kept = np.rint(np.linspace(0, len(by_size) - 1, most)).astype(int)
     return {by_size[row].name for row in kept}
+
+
+def _at_least_a_quarter(recordings: Sequence[Recording], chosen: set[str]) -> set[str]:
+    """Hold out more where chance has chosen few: of middle size, as training shows.
+
+    What is not the last of its kind first: one recording judges little.
+    """
+    held_out = set(chosen)
+    sizes = {one.name: float(np.max(np.abs(one.input))) or 1.0 for one in recordings}
+    middle = float(np.median(list(sizes.values())))
+
+    def is_last(one: Recording) -> bool:
+        kind = [two for two in recordings if two.kind == one.kind]
+        return sum(two.name not in held_out for two in kind) == 1
+
+    tried = set(held_out)
+    while len(held_out) < len(recordings) // 4 and len(tried) < len(recordings):
+        left = [one for one in recordings if one.name not in tried]
+        ranks = [(is_last(one), abs(np.log(sizes[one.name] / middle))) for one in left]
+        name = left[min(range(len(left)), key=ranks.__getitem__)].name
+        tried.add(name)
+        if name in _without_extremes(recordings, held_out | {name}):
+            held_out.add(name)
+    return held_out
 
 
 def _of_kind(members: Sequence[Recording]) -> set[str]:

@@ -94,6 +94,7 @@ def scales_of_recordings(
         missing=missing,
         passes_once=problem.passes_once,
         way_m=problem.way_without_return,
+        has_spring=natural > 2.0 / duration,
     )
 
 

@@ -129,6 +129,8 @@ class Scales:
         Whether each place of the way is passed once.
     way_m : float, [m]
         Of the longest recording, where none passes a place again; else 0.
+    has_spring : bool
+        Whether mass and spring say how fast the drive is.
     """
 
     displacement_m: float
@@ -149,6 +151,7 @@ class Scales:
     missing: Missing | None = field(default=None, compare=False, repr=False)
     passes_once: bool = False
     way_m: float = 0.0
+    has_spring: bool = True
 
     def __post_init__(self) -> None:
         if self.reading == 0:

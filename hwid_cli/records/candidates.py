@@ -17,6 +17,7 @@ CAUSES = {
     "stand_in": "small, and of the kind that the drive in place of the simulation is "
     "wrong by at steps of the input",
     "zeros": "the sensor's zero, which differs between recordings",
+    "late_input": "timing: the input stands later in the recordings than it acted",
     "interpolation": "noise that interpolation between uneven samples has linked",
     "coloured_noise": "coloured noise, of one size and colour in all recordings",
 }

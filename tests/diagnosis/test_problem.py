@@ -366,3 +366,15 @@ def test_without_a_spring_nothing_pulls_a_drive_that_is_held(simulation, start):
     ]
     options = DiagnoseOptions(initial_state="held")
     assert prepare(referred, simulation, options, ["b"]).start == start
+
+
+def test_at_least_a_quarter_is_held_out_and_training_sees_all_of_the_range():
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        n = int(rng.integers(8, 14))
+        sizes, speeds = rng.uniform(0.5, 3, n), rng.uniform(0.5, 6, n)
+        pairs = zip(sizes, speeds, strict=True)
+        given = [sine(f"r{row}", *one) for row, one in enumerate(pairs)]
+        held = [int(name[1:]) for name in held_out_names(given)]
+        assert len(held) >= n // 4
+        assert np.delete(sizes, held).max() >= 0.95 * sizes.max()

@@ -1,0 +1,111 @@
+"""Recordings whose input was logged later than it acted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import integrate
+
+from hwid_cli.diagnosis.diagnose import diagnose
+from hwid_cli.records.experiment import DiagnoseOptions
+from hwid_cli.records.recordings import Recording
+from tests.diagnosis.small_drive import NOISE, in_turn, recordings, simulation
+from tests.stages.diagnosed_drive import FRICTION
+
+FEW = ("coulomb_friction", "actuator_lag", "input_delay", "second_mode")
+SAID = "the input stands later in the recordings than it acted"
+
+
+def found(given, of=None):
+    options = DiagnoseOptions(effects=FEW, max_effects=1)
+    return diagnose(given, of or simulation(), options, in_turn, lambda what, n: None)
+
+
+def logged_late(given, samples):
+    """The same recordings with the input of the samples before."""
+    return [
+        replace(one, input=np.r_[np.full(samples, one.input[0]), one.input[:-samples]])
+        for one in given
+    ]
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("samples", [1, 2])
+def test_an_input_that_was_logged_late_is_no_effect(samples):
+    diagnosis = found(
+        logged_late(recordings(), samples), simulation(stiffness_N_per_m=1000.0)
+    )
+
+    assert diagnosis.verdict == "parameters"
+    assert SAID in diagnosis.summary
+    after = {one.name: one.after for one in diagnosis.base}
+    assert after["stiffness_N_per_m"] == pytest.approx(1184.0, rel=2e-3)
+    assert after["damping_N_s_per_m"] == pytest.approx(15.0, rel=1e-2)
+    assert diagnosis.after.held_out_rms == pytest.approx(NOISE, rel=0.05)
+
+
+@pytest.mark.thorough
+def test_an_input_that_was_logged_early_is_a_delay():
+    early = [
+        replace(one, input=np.r_[one.input[2:], one.input[-1:], one.input[-1:]])
+        for one in recordings()
+    ]
+    diagnosis = found(early)
+
+    assert diagnosis.verdict == "named"
+    assert [one.id for one in diagnosis.effects] == ["input_delay"]
+
+
+@pytest.mark.thorough
+def test_a_late_input_hides_no_friction():
+    diagnosis = found(recordings(FRICTION))
+
+    assert [one.id for one in diagnosis.effects] == ["coulomb_friction"]
+    assert SAID not in diagnosis.summary
+
+
+def axis_in_a_loop(seed, moves, step=2e-3, n=1500):
+    """A free axis with friction under a position loop, by scipy; its own current."""
+    mass, damping, gain, friction = 12.5, 85.0, 38.0, 17.0
+    rng = np.random.default_rng(seed)
+    goal = np.interp(np.arange(n) * step, *moves)
+    x = v = 0.0
+    current, position = np.zeros(n), np.zeros(n)
+    for k in range(n):
+        position[k] = x
+        current[k] = np.clip(13.0 * (14.0 * (goal[k] - x) - v), -16, 16)
+        force = gain * current[k]
+
+        def rates(t, y, force=force):
+            rub = friction * np.tanh(y[1] / 1e-5)
+            return [y[1], (force - damping * y[1] - rub) / mass]
+
+        ends = integrate.solve_ivp(rates, (0, step), [x, v], method="LSODA", rtol=1e-7)
+        x, v = ends.y[:, -1]
+    read = position + 3e-4 * rng.standard_normal(n)
+    return Recording(f"r{seed}", np.r_[0.0, current[:-1]], read, step)
+
+
+@pytest.mark.thorough
+def test_it_is_told_beside_friction_in_a_loop_too():
+    """Played back, each minimum of the squares is near the next one."""
+    given = [
+        axis_in_a_loop(1, ([0.1, 0.5, 1.2, 1.7], [0, 0.25, 0.25, 0.05])),
+        axis_in_a_loop(2, ([0.1, 1.0, 2.0, 2.9], [0, 0.1, -0.1, 0.2])),
+        axis_in_a_loop(3, ([0.1, 0.4, 0.9, 1.3, 2.0, 2.4], [0, 0.1, 0.1, 0, 0, 0.3])),
+        axis_in_a_loop(4, ([0.1, 2.5, 2.9], [0, 0.3, 0.2])),
+    ]
+    of = simulation(
+        mass_kg=12.5,
+        damping_N_s_per_m=110.0,
+        stiffness_N_per_m=0.0,
+        force_constant_N_per_A=34.0,
+        hold="zero",
+        effects={"coulomb_friction": {"force_N": 22.0}},
+    )
+    diagnosis = found(given, of)
+    after = {one.name: one.after for one in diagnosis.base}
+
+    assert diagnosis.verdict == "parameters"
+    assert SAID in diagnosis.summary
+    assert after["force_constant_N_per_A"] == pytest.approx(38.0, rel=5e-3)
