@@ -618,7 +618,28 @@ def _other_columns(named: list[_Named], first: _Named, last: _Named) -> list[str
     left = [one for one in named if one not in (first, last)]
     shown = ", ".join(_called(one.column) for one in left[:8])
     more = ", ..." if len(left) > 8 else ""
-    return [f"other columns that change: {shown}{more}"] if left else []
+    notes = [f"other columns that change: {shown}{more}"] if left else []
+    return [*notes, *_circuit_notes(left, first)]
+
+
+def _circuit_notes(left: list[_Named], first: _Named) -> list[str]:
+    """Say that both ends of a motor's circuit are there, and what taking each means."""
+    taken = unit_of_column(first.column, "input")
+    means = {
+        "V": "a voltage is what drives the motor, resistance and back-EMF between",
+        "A": "a current is what the motor's force goes with, whatever the voltage did",
+    }
+    own = next((one for one in means if factor_between(taken, one) is not None), None)
+    if own is None:
+        return []
+    (other,) = set(means) - {own}
+    for one in left:
+        if factor_between(unit_of_column(one.column, "input"), other) is not None:
+            return [
+                f"{_called(one.column)} may be the input as well: {means[other]}; "
+                f"columns: {{input: {one.column.key!r}}} takes it"
+            ]
+    return []
 
 
 def _scale_notes(first: FoundColumn, last: FoundColumn) -> list[str]:

@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hwid_cli.data.array_columns import (
     TITLE_MARK,
     UNIT_MARK,
@@ -110,7 +112,35 @@ def _with_members(name: str, value: Any) -> dict[str, Any]:
                 label = found.get(key.removesuffix(numbers) + words)
                 if label is not None and text_of(label):
                     found[key + TITLE_MARK] = label
+    found.update(_experiments_of_iddata(name, found))
     return {**found, **_said_of_iddata(name, found)}
+
+
+def _experiments_of_iddata(name: str, found: Mapping[str, Any]) -> dict[str, Any]:
+    """Several recordings in one iddata, as ``merge`` makes it, each as one of its own."""
+    count = len(_cells(found.get(f"{name}.OutputData")))
+    if count < 2:
+        return {}
+    labels = [text_of(one) for one in _cells(found.get(f"{name}.ExperimentName"))]
+    if len(set(filter(None, labels))) != count:
+        labels = [f"Exp{number + 1}" for number in range(count)]
+    parts: dict[str, Any] = {}
+    for row, label in enumerate(labels):
+        place = f"{name}.{label}"
+        for member in dict.fromkeys(one for pair in _IDDATA for one in pair[:2]):
+            value = found.get(f"{name}.{member}")
+            if len(each := _cells(value)) == count:
+                value = each[row]
+            if value is not None:
+                parts[f"{place}.{member}"] = value
+        parts.update(_said_of_iddata(place, parts))
+    return parts
+
+
+def _cells(value: Any) -> list[Any]:
+    """What is in an array of cells; nothing where a variable is none."""
+    is_array = isinstance(value, np.ndarray) and value.dtype == object
+    return list(value.ravel()) if is_array else []
 
 
 def _said_of_iddata(name: str, found: Mapping[str, Any]) -> dict[str, Any]:

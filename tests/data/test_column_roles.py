@@ -292,3 +292,24 @@ def test_whole_numbers_that_grow_evenly_are_no_seconds(title, unit, is_sure):
 @pytest.mark.parametrize("title", ["sample", "position"])
 def test_what_is_named_otherwise_is_no_clock(title):
     assert guess_time([column(title, 20.0 * np.arange(N))]).role is None
+
+
+@pytest.mark.parametrize(
+    ("units", "said"),
+    [
+        (("V", "A"), "'U_mot' may be the input as well: a voltage"),
+        (("V", ""), None),
+        (("N m", "A"), None),
+    ],
+)
+def test_both_ends_of_a_circuit_are_told(units, said):
+    found = guess_signals(
+        [
+            column("U_mot", VOLTAGE, units[0]),
+            column("I_mot", CURRENT, units[1]),
+            column("pos", POSITION, "mm"),
+        ]
+    )
+    notes = [one for one in found.notes if "may be the input as well" in one]
+    assert (found.input.key, bool(notes)) == ("I_mot", said is not None)
+    assert said is None or (said in notes[0] and "{input: 'U_mot'}" in notes[0])

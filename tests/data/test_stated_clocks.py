@@ -93,3 +93,33 @@ def test_titles_of_blocks_are_no_names(tmp_path):
     found = {one.title: one.values for one in list_columns(path)}
     assert list(found) == ["time(s)", "volt(V)", "pos(cm)"]
     assert found["pos(cm)"].size == 2 * N
+
+
+@pytest.mark.parametrize("names", [("Exp1", "Exp2", "slow"), ("a", "a", "a")])
+def test_experiments_of_a_merged_iddata_are_recordings(tmp_path, names):
+    rng = np.random.default_rng(2)
+    u = [rng.standard_normal((80 + 5 * k, 1)) for k in range(3)]
+
+    def cells(values):
+        found = np.empty((1, 3), dtype=object)
+        found[0, :] = values
+        return found
+
+    z = {
+        "OutputData": cells([2 * one for one in u]),
+        "InputData": cells(u),
+        "OutputName": cells(["pos"])[:, :1],
+        "OutputUnit": cells(["mm"])[:, :1],
+        "Ts": cells([0.005] * 3),
+        "TimeUnit": "milliseconds",
+        "ExperimentName": cells(names),
+    }
+    path = tmp_path / "z.mat"
+    scipy.io.savemat(path, {"z": z})
+    # Names that are not unique are numbered.
+    table = names[2] if len(set(names)) == 3 else "Exp3"
+    columns = {one.key: one for one in list_columns(path)}
+    output = columns[f"z.{table}.OutputData"]
+    np.testing.assert_array_equal(output.values, 2 * u[2][:, 0])
+    assert (output.unit, output.title) == ("mm", "pos")
+    assert columns[f"z.{table}.Ts"].unit == "milliseconds"
