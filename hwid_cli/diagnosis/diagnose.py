@@ -374,6 +374,9 @@ def _on_whole_recordings(searched: _Searched, max_effects: int) -> _Searched:
     def is_enough(so_far: RoundsResult) -> bool:
         return may_be_enough and is_settled_if_held(rounds, so_far)
 
+    if criteria.is_close_to_noise(rounds.base):
+        # A quarter of the noise holds no set of effects.
+        max_effects = min(max_effects, 1)
     found = run_rounds(rounds, max_effects, is_enough, known)
     return replace(searched, found=found)
 

@@ -12,6 +12,7 @@ from hwid_cli.diagnosis.candidate import rebuilt
 from hwid_cli.diagnosis.parameters import (
     ParameterLayout,
     ParameterPoint,
+    Unknown,
     residuals_at,
     sum_of_squares,
 )
@@ -65,6 +66,25 @@ def unclear_effects(
         for effect in found.effects
         if not all(map(is_clear, _telling(effect, found.names)))
     )
+
+
+def runs_to_bound(
+    problem: DiagnosisProblem, found: CandidateFit, scales: Scales
+) -> bool:
+    """Whether the strength of an effect went as far as it may: it imitates something."""
+    telling = {ref for one in found.effects for ref in _telling(one, found.names)}
+    if not telling or not found.is_usable:
+        return False
+    fit_layout, point = rebuilt(problem, found, scales)
+    return any(
+        one.ref in telling and _is_at_bound(one, q)
+        for one, q in zip(fit_layout.shared, point.shared, strict=True)
+    )
+
+
+def _is_at_bound(unknown: Unknown, coordinate: float) -> bool:
+    farthest = max(abs(unknown.low), abs(unknown.high))
+    return abs(unknown.value(coordinate)) >= _AT_BOUND * farthest
 
 
 def _direction_of_size(

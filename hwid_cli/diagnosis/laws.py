@@ -189,6 +189,7 @@ def _most_terms(rounds: Rounds, verdict: DiagnosisVerdict) -> int:
     """
     is_open = rounds.base.is_usable and not rounds.problem.compares_command
     is_settled = verdict.is_complete or rounds.criteria.leaves_noise(verdict.chosen)
+    is_settled = is_settled or rounds.criteria.is_close_to_noise(rounds.base)
     if is_settled or not is_open:
         return 0
     return _as_short(rounds, verdict) or MOST_TERMS

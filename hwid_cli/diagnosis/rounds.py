@@ -19,6 +19,7 @@ from hwid_cli.diagnosis.candidate import (
 )
 from hwid_cli.diagnosis.effect_sets import Effects, includes_one_of
 from hwid_cli.diagnosis.few_samples import fewer_recordings
+from hwid_cli.diagnosis.intervals import runs_to_bound
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.proposals import Proposals
 from hwid_cli.diagnosis.related_sets import (
@@ -302,8 +303,14 @@ class _Search:
         return chosen
 
     def _is_worth_it(self, found: CandidateFit) -> bool:
-        """Whether a set explains enough for others to be built on it."""
-        against = self.rounds.criteria.evidence(found, self.rounds.base)
+        """Whether a set explains enough for others to be built on it.
+
+        Not what imitates something else, and went as far as it may for that.
+        """
+        rounds = self.rounds
+        if runs_to_bound(rounds.problem, found, rounds.baseline.scales):
+            return False
+        against = rounds.criteria.evidence(found, rounds.base)
         return against.explained >= LEAST_OF_PARENT
 
     def fit_parts(self, best: list[CandidateFit]) -> None:

@@ -193,6 +193,12 @@ class SelectionCriteria:
         rms, noise = self.rms(found, held_out=True), self.held_out_noise
         return rms / noise if noise > 0 else float("inf")
 
+    def is_close_to_noise(self, found: CandidateFit) -> bool:
+        """Whether what is left is of no account, of held-out recordings and of all."""
+        every = np.ones(self.is_held_out.size, dtype=bool)
+        over = max(self.ratio(found), self._over_noise(found, every))
+        return found.is_usable and over <= CLOSE_TO_NOISE
+
     def evidence(self, found: CandidateFit, other: CandidateFit) -> Evidence:
         """How a candidate does against another one."""
         held = self.is_held_out

@@ -12,7 +12,7 @@ from hwid_cli.diagnosis.odd_recordings import (
     went_another_way,
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.selection import CLOSE_TO_NOISE, SelectionCriteria, title_of
+from hwid_cli.diagnosis.selection import SelectionCriteria, title_of
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, lead
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.axis import name_on
@@ -200,7 +200,7 @@ def _cause(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:
             "be wrong by: outputs alone do not tell it from a small effect."
         )
     if not verdict.is_complete:
-        if criteria.ratio(verdict.chosen) <= CLOSE_TO_NOISE:
+        if criteria.is_close_to_noise(verdict.chosen):
             return " Too little is left beyond the noise for an effect to be named."
         is_little = criteria.ratio(verdict.chosen) <= SMALL_REMAINDER
         what = "The little that" if is_little else "What"

@@ -157,7 +157,7 @@ def _nameless(
     unclear: Callable[[CandidateFit], tuple[str, ...]],
 ) -> DiagnosisVerdict:
     """What is said where no set may be named: little is left, or several share it."""
-    if criteria.ratio(base) <= CLOSE_TO_NOISE:
+    if criteria.is_close_to_noise(base):
         is_white = base.whiteness <= NEARLY_WHITE
         return DiagnosisVerdict(
             _without_effect(criteria, given_sse, base), is_white, base, ()

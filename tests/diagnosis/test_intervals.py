@@ -1,10 +1,13 @@
 """Which effects of a fit the recordings leave open."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.intervals import (
     intervals,
+    runs_to_bound,
     shared_covariance,
     unclear_effects,
 )
@@ -84,3 +87,23 @@ def test_what_nothing_determines_leaves_the_other_intervals_as_they_are(monkeypa
     np.testing.assert_array_equal(lost[0][1:], low[1:])
     np.testing.assert_array_equal(lost[1][1:], high[1:])
     assert not lost[1][0] <= high[0]
+
+
+@pytest.mark.parametrize(("share", "at_bound"), [(0.95, True), (0.5, False)])
+def test_a_strength_that_ran_to_its_bound_imitates(share, at_bound):
+    given = problem(recordings())
+    scales = sizes(problem())
+    start = {"share": 0.1, "per_turn": 300.0, "phase_rad": 0.2}
+    found = fit(given, {"torque_ripple": start}, scales=scales)
+    column = found.names.index(ParameterRef("torque_ripple", "share"))
+    values = found.values.copy()
+    values[column] = share
+    found = replace(found, values=values)
+
+    assert runs_to_bound(given, found, scales) is at_bound
+    assert ("torque_ripple" in unclear_effects(given, found, scales)) or not at_bound
+
+
+def test_a_base_has_no_bound_to_run_to():
+    given = problem(recordings())
+    assert not runs_to_bound(given, fit(given), sizes(problem()))

@@ -742,6 +742,13 @@ def test_a_quarter_of_the_noise_is_too_little_to_be_unknown(sse, word):
     assert (verdict.word, verdict.is_complete) == (word, False)
 
 
+def test_what_training_recordings_leave_counts_too():
+    left = base(np.where(CRITERIA.is_held_out, 100.0, 400.0), whiteness=30.0)
+    assert CRITERIA.ratio(left) == pytest.approx(1.0)
+    assert not CRITERIA.is_close_to_noise(left)
+    assert CRITERIA.is_close_to_noise(base(105.0))
+
+
 def test_there_is_a_word_for_every_case_and_no_other():
     words = {"named", "ambiguous", "law", "parameters", "unknown", "none"}
     assert set(VERDICTS) == words
