@@ -33,7 +33,7 @@ from hwid_cli.diagnosis.through_pieces import fit_through_pieces
 from hwid_cli.diagnosis.zeros import with_zeros
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
-from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.candidates import LATE_INPUT, CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
 
 # A line that takes this share of what the base leaves is no colour of noise.
@@ -88,7 +88,7 @@ def fitted_base(problem: DiagnosisProblem) -> FittedBase:
     base = with_input_noise(problem, base, scales, noise)
     problem, base = with_zeros(problem, base, scales, noise)
     problem, base = with_earlier_input(problem, base, scales, noise)
-    if base.cause in ("zeros", "late_input"):
+    if base.cause in ("zeros", *LATE_INPUT):
         given = compared_as_given(problem)
     if base.is_usable:
         scales = scales_of_fit(problem, base, scales, noise)

@@ -14,12 +14,11 @@ from hwid_cli.diagnosis.candidate import fit_candidate, start_from
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.through_pieces import fit_through_pieces
 from hwid_cli.drive.effect import Scales
-from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.candidates import LATE_INPUT, CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import HELD
 
-# Whole samples that are tried, while each one leaves clearly less than the one before.
-_MOST_SAMPLES = 3
+# Each further sample that is tried leaves clearly less than the one before.
 _CLEARLY_LESS = 0.97
 
 
@@ -43,7 +42,7 @@ def with_earlier_input(
         return problem, base
     for way in _ways(problem):
         least = float(base.sse.sum())
-        for samples in range(1, _MOST_SAMPLES + 1):
+        for samples, cause in enumerate(LATE_INPUT, start=1):
             earlier = replace(
                 way, signals=tuple(_taken_back(one, samples) for one in way.signals)
             )
@@ -54,7 +53,7 @@ def with_earlier_input(
             if not (found.is_usable and left < _CLEARLY_LESS * least):
                 break
             if found.whiteness <= 1.0:
-                return earlier, replace(found, cause="late_input")
+                return earlier, replace(found, cause=cause)
             least = left
     return problem, base
 

@@ -11,13 +11,21 @@ from hwid_cli.records.stored import ADDED_LATER
 # What a candidate is to the verdict: what it states, what it cannot tell from that.
 CANDIDATE_ROLES = ("", "diagnosis", "rival")
 
+# An input that was logged later than it acted, by one sample, two, three.
+LATE_INPUT = ("late_input", "late_input_2", "late_input_3")
 # What the measuring chain may add to the noise of the output, in words.
 CAUSES = {
     "input_noise": "noise of the measured input, seen through the drive",
     "stand_in": "small, and of the kind that the drive in place of the simulation is "
     "wrong by at steps of the input",
     "zeros": "the sensor's zero, which differs between recordings",
-    "late_input": "timing: the input stands later in the recordings than it acted",
+    **{
+        cause: f"timing: the input stands {count} later in the recordings than it acted; "
+        "take its column back by as much"
+        for cause, count in zip(
+            LATE_INPUT, ("one sample", "two samples", "three samples"), strict=True
+        )
+    },
     "interpolation": "noise that interpolation between uneven samples has linked",
     "coloured_noise": "coloured noise, of one size and colour in all recordings",
 }
