@@ -375,7 +375,7 @@ def _on_whole_recordings(searched: _Searched, max_effects: int) -> _Searched:
         return may_be_enough and is_settled_if_held(rounds, so_far)
 
     if criteria.is_close_to_noise(rounds.base):
-        # A quarter of the noise holds no set of effects.
+        # A third of the noise holds no set of effects.
         max_effects = min(max_effects, 1)
     found = run_rounds(rounds, max_effects, is_enough, known)
     return replace(searched, found=found)

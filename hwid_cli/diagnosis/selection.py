@@ -62,6 +62,9 @@ LEAST_SPREAD = 0.01
 LEAST_PIECES = 10
 # Ratio to the noise up to which what remains is of no account.
 CLOSE_TO_NOISE = 1.03
+# Ratio to the noise of noise and what is a third as large: drifts and other flaws of
+# measuring are of that size.
+A_THIRD_MORE = float(np.sqrt(1 + 1 / 9))
 # Candidates closer than this are not told apart.
 TIE = 6.0
 # Nor are those that leave at most so many times as much beyond the noise, where both
@@ -194,10 +197,10 @@ class SelectionCriteria:
         return rms / noise if noise > 0 else float("inf")
 
     def is_close_to_noise(self, found: CandidateFit) -> bool:
-        """Whether what is left is of no account, of held-out recordings and of all."""
+        """Whether too little is left for a name, of held-out recordings and of all."""
         every = np.ones(self.is_held_out.size, dtype=bool)
         over = max(self.ratio(found), self._over_noise(found, every))
-        return found.is_usable and over <= CLOSE_TO_NOISE
+        return found.is_usable and over <= A_THIRD_MORE
 
     def evidence(self, found: CandidateFit, other: CandidateFit) -> Evidence:
         """How a candidate does against another one."""
@@ -345,7 +348,11 @@ class SelectionCriteria:
         docs/method_diagnosis.md, eq. (D24).
         """
         against = self.evidence(found, base)
-        explains = against.explained >= self._least_explained(found)
+        least = self._least_explained(found)
+        if self.ratio(base) <= SMALL_REMAINDER:
+            # So little a sensor that drifts leaves, too, and half of it is soon explained.
+            least = max(least, LEAST_EXPLAINED_SET)
+        explains = against.explained >= least
         return (
             against.gain >= LEAST_GAIN
             and (explains or self.leaves_noise(found))

@@ -733,8 +733,8 @@ def test_a_small_remainder_that_goes_with_no_effect_is_none_but_not_all(sse, whi
     assert (verdict.word, verdict.is_complete) == ("none", False)
 
 
-@pytest.mark.parametrize(("sse", "word"), [(105.0, "none"), (108.0, "unknown")])
-def test_a_quarter_of_the_noise_is_too_little_to_be_unknown(sse, word):
+@pytest.mark.parametrize(("sse", "word"), [(110.0, "none"), (114.0, "unknown")])
+def test_a_third_of_the_noise_is_too_little_to_be_unknown(sse, word):
     """An offset that drifts: some effect always takes a part of it."""
     left = base(sse, whiteness=30.0)
     weak = made_up(("cogging",), sse - 0.45 * (sse - 100.0), parameters=3)
@@ -747,6 +747,13 @@ def test_what_training_recordings_leave_counts_too():
     assert CRITERIA.ratio(left) == pytest.approx(1.0)
     assert not CRITERIA.is_close_to_noise(left)
     assert CRITERIA.is_close_to_noise(base(105.0))
+
+
+@pytest.mark.parametrize(("explained", "word"), [(0.7, "unknown"), (0.85, "named")])
+def test_beside_a_small_gap_an_effect_has_to_explain_most_of_it(explained, word):
+    left = base(130.0, whiteness=30.0)
+    one = made_up(("cogging",), 130.0 - explained * 30.0, parameters=3, whiteness=9.0)
+    assert decided(left, [one], [one], given=130.0).word == word
 
 
 def test_there_is_a_word_for_every_case_and_no_other():
