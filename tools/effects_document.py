@@ -213,14 +213,9 @@ def _key(one: Stated) -> str:
 
 
 def _starts(parameter: Parameter) -> str:
-    lines, count = SCALES.frequencies_Hz, len(SCALES.frequencies_Hz)
-    if parameter.starts(SCALES)[:count] != lines:
-        return _law_around(parameter.center, parameter.starts)
-    said = "highest lines in the spectrum of the error"
-    others = _law_around(
-        parameter.center, lambda scales: parameter.starts(scales)[count:]
-    )
-    return f"{said}; {others}" if parameter.starts(SCALES)[count:] else said
+    if parameter.starts(SCALES) == SCALES.frequencies_Hz:
+        return "highest lines in the spectrum of the error"
+    return _law_around(parameter.center, parameter.starts)
 
 
 def _bounds(parameter: Parameter) -> str:

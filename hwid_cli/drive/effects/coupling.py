@@ -22,10 +22,10 @@ from hwid_cli.drive.effect import (
 
 
 def _frequencies(scales: Scales) -> tuple[float, ...]:
-    """Frequencies above that of mass and spring, and those of the error.
+    """Frequencies above that of mass and spring.
 
-    Where no spring says how fast the drive is, all that a recording shows: a search finds
-    a resonance from within a factor of 1.3.
+    Where no spring says how fast the drive is, those of the error, and all that a
+    recording shows: a search finds a resonance from within a factor of 1.3.
     """
     found = [
         factor * scales.natural_Hz for factor in (1.4, 2.0, 2.6, 3.4, 4.5, 6.0, 9.0)
@@ -34,8 +34,8 @@ def _frequencies(scales: Scales) -> tuple[float, ...]:
         above = _HIGHEST_OF_FREE / scales.sample_time_s / found[-1]
         count = int(log(max(above, 1.0), _FREQUENCY_STEP))
         found += [found[-1] * _FREQUENCY_STEP ** (n + 1) for n in range(count)]
-    highest = 0.4 / scales.sample_time_s
-    return tuple(min(one, highest) for one in (*scales.frequencies_Hz, *found))
+        found += scales.frequencies_Hz
+    return tuple(min(one, 0.4 / scales.sample_time_s) for one in found)
 
 
 # Frequencies of a free axis are tried up to this share of the sample rate, in such steps.
