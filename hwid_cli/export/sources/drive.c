@@ -223,7 +223,7 @@ static void interval(HWID_NAME(state) *s, double first, double last)
     double rows[MOST_PIECES][3], push[N_PUSH];
     double time = (double)(s->sample - 1) * sample_time;
     const drive_kind kind = drive_kind_of(p);
-    const double step = drive_longest_step(sample_time, kind);
+    const double step = drive_longest_step(sample_time, kind, p);
     int n, count = 1;
     for (n = 0; n + 1 < N_HISTORY; ++n) {
         s->starts[n] = s->starts[n + 1];
