@@ -71,3 +71,23 @@ def drive_of(found):
         one.parameter: value
         for one, value in zip(found.names, found.values, strict=True)
     }
+
+
+@pytest.mark.thorough
+def test_a_period_that_the_simulation_states_is_not_lost_while_the_base_is_off():
+    """From there a fit of all at once ends at 5.26 mm, a thousand times the noise."""
+    cogging = {"cogging": {"amplitude_N": 0.8, "period_m": 4e-3, "phase_rad": 0.6}}
+    given = problem(
+        recordings(cogging),
+        damping_N_s_per_m=22.0,
+        stiffness_N_per_m=900.0,
+        force_constant_N_per_A=4.0,
+        effects={"cogging": {**cogging["cogging"], "amplitude_N": 0.5}},
+    )
+    at_once = fit(given)
+    found = base_fit.fitted_base(given).base
+    column = [one.parameter for one in found.names].index("period_m")
+
+    assert at_once.whiteness > 100
+    assert found.whiteness <= 1.0
+    assert found.values[column] == pytest.approx(4e-3, rel=1e-4)

@@ -6,10 +6,21 @@ import numpy as np
 import pytest
 from scipy import integrate
 
+from hwid_cli.diagnosis.candidate import SearchStart, base_of, fit_candidate
 from hwid_cli.diagnosis.diagnose import diagnose
+from hwid_cli.diagnosis.through_pieces import fit_through_pieces
+from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.recordings import Recording
-from tests.diagnosis.small_drive import NOISE, in_turn, recordings, simulation
+from tests.diagnosis.small_drive import (
+    NOISE,
+    in_turn,
+    problem,
+    recordings,
+    simulation,
+    sizes,
+    white,
+)
 from tests.stages.diagnosed_drive import FRICTION
 
 FEW = ("coulomb_friction", "actuator_lag", "input_delay", "second_mode")
@@ -109,3 +120,66 @@ def test_it_is_told_beside_friction_in_a_loop_too():
     assert diagnosis.verdict == "parameters"
     assert SAID in diagnosis.summary
     assert after["force_constant_N_per_A"] == pytest.approx(38.0, rel=5e-3)
+
+
+def rippled_axis_in_a_loop(seed, moves, step=2e-3, n=1500, parts=40):
+    """The same with 0.8 N of ripple each 5 mm, in small explicit steps."""
+    goal = np.interp(np.arange(n) * step, *moves)
+    x = v = 0.0
+    current, position = np.zeros(n), np.zeros(n)
+    for k in range(n):
+        position[k] = x
+        current[k] = np.clip(13.0 * (14.0 * (goal[k] - x) - v), -16, 16)
+        for _ in range(parts):
+            force = 38.0 * current[k] - 85.0 * v
+            force += 0.8 * np.sin(2 * np.pi * x / 5e-3 + 0.6)
+            if v == 0 and abs(force) <= 17.0:
+                continue
+            way = np.sign(v if v else force)
+            moved = v + step / parts * (force - 17.0 * way) / 12.5
+            v = 0.0 if v and moved * v < 0 else moved
+            x += step / parts * v
+    read = position + 3e-4 * np.random.default_rng(seed).standard_normal(n)
+    return Recording(f"r{seed}", current, read, step)
+
+
+@pytest.mark.thorough
+def test_pieces_lead_out_of_a_minimum_that_friction_makes():
+    rng = np.random.default_rng(0)
+    times = [0.1, 0.5, 0.9, 1.3, 1.7, 2.1, 2.5, 2.9]
+    walks = [np.r_[0, np.cumsum(rng.uniform(-0.15, 0.15, 7))] for _ in range(8)][4:]
+    of = problem(
+        [rippled_axis_in_a_loop(k, (times, one)) for k, one in enumerate(walks)],
+        mass_kg=12.5,
+        damping_N_s_per_m=70.0,
+        stiffness_N_per_m=0.0,
+        force_constant_N_per_A=42.0,
+        hold="zero",
+        effects={
+            "coulomb_friction": {"force_N": 13.0},
+            "cogging": {"amplitude_N": 0.48, "period_m": 5e-3, "phase_rad": 0.6},
+        },
+    )
+    start = SearchStart(base_of(of.drive), drive_effects(of.drive))
+    found = fit_candidate(of, (), [start], sizes(of), white(3e-4))
+    better = fit_through_pieces(of, found, sizes(of), white(3e-4))
+
+    assert found.whiteness > 1.0
+    assert better.sse.sum() < 0.1 * found.sse.sum()
+
+
+@pytest.mark.thorough
+def test_a_third_of_the_noise_is_searched_for_single_effects_only():
+    """A sensor that warms up: sets of effects are not worth their time."""
+    warming = [
+        replace(one, output=one.output + 0.5 * NOISE * np.exp(-np.arange(400) / 150))
+        for one in recordings()
+    ]
+    seen = []
+    options = DiagnoseOptions(effects=FEW, max_effects=3)
+    diagnosis = diagnose(
+        warming, simulation(), options, in_turn, lambda what, n: seen.append(what)
+    )
+    assert diagnosis.verdict == "none"
+    assert any("single effects" in one for one in seen)
+    assert not any("sets of 2" in one for one in seen)

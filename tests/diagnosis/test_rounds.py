@@ -297,3 +297,12 @@ def test_what_leads_in_pieces_is_not_told(monkeypatch, are_pieces):
     (what,) = said
     assert what.startswith("sets of 2 effects")
     assert ("so far" in what) is not are_pieces
+
+
+def test_nothing_is_built_on_what_ran_to_its_bound(monkeypatch):
+    search = rounds._Search(replace(rounds_of_fits(), base=made_up_base(900.0)))
+    one, best = made_up(("end_stop",), 300.0), made_up(("torque_ripple",), 150.0)
+    search.fits.found = {fit.effects: fit for fit in (one, best)}
+    assert search.parents(1) == [best, one]
+    monkeypatch.setattr(rounds, "runs_to_bound", lambda _, found, scales: found is best)
+    assert search.parents(1) == [one]

@@ -229,3 +229,16 @@ def test_a_base_that_hardly_moves_makes_no_speed_small(is_velocity):
     assert found == pytest.approx(0.1 if is_velocity else 2.0, rel=0.01)
     fast = scales_of_recordings(of, [np.full(3, 50.0) for _ in signals])
     assert fast.velocity_m_per_s == 50.0
+
+
+@pytest.mark.parametrize("has_spring", [True, False])
+def test_appendages_of_a_free_axis_are_looked_for_at_all_frequencies(has_spring):
+    given = replace(
+        sizes(problem()), has_spring=has_spring, natural_Hz=0.08, sample_time_s=5e-3,
+        frequencies_Hz=(0.917,),
+    )  # fmt: skip
+    found = CATALOGUE["second_mode"].parameter("frequency_Hz").starts(given)
+    assert (0.917 in found) is not has_spring
+    # A search finds a resonance from within a factor of 1.3.
+    near = [min(abs(np.log(np.array(found) / one))) for one in (0.9, 2.0, 7.0, 15.0)]
+    assert (max(near) < np.log(1.3)) is not has_spring
