@@ -45,6 +45,8 @@ MODULES = (
     f"{_DRIVE}.motion.forces",
     f"{_DRIVE}.motion.resting",
     f"{_DRIVE}.motion.corners",
+    f"{_DRIVE}.motion.runge_kutta",
+    f"{_DRIVE}.motion.winding",
     f"{_DRIVE}.motion.curved",
     f"{_DRIVE}.motion.linear",
     f"{_DRIVE}.motion.events",

@@ -53,9 +53,7 @@ def unclear_effects(
     def is_clear(ref: ParameterRef) -> bool:
         column = found.names.index(ref)
         unknown, q = fit_layout.shared[column], point.shared[column]
-        if abs(unknown.value(q)) >= _AT_BOUND * max(
-            abs(unknown.low), abs(unknown.high)
-        ):
+        if _is_at_bound(unknown, q):
             return False
         reach = spread.reach(_direction_of_size(ref, fit_layout, point, scales))
         # Of a logarithm linearised: a relative deviation of the value itself.

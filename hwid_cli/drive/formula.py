@@ -316,7 +316,8 @@ def has_friction(node: Node) -> bool:
     """
     if _is_direction(node):
         return True
-    if node.name in ("*", "/") and any(_rests(one) for one in node.parts):
+    factors = {"*": node.parts, "/": node.parts[:1]}.get(node.name, ())
+    if any(_rests(one) for one in factors):
         return False
     return any(has_friction(one) for one in node.parts)
 

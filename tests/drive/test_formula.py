@@ -118,6 +118,8 @@ def test_edges_and_waves_are_seen():
         ("abs(v)**0.5*sign(v) - 3*sign(v)", True),
         ("(abs(v) + 1)*sign(v)", True),
         ("x*sign(v)", True),
+        ("sign(v)/(1 + v)", True),
+        ("sqrt(abs(v))*sign(v)/3", False),
         ("cos(v)*sign(v)", True),
     ],
 )

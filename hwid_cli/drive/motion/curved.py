@@ -26,26 +26,24 @@ from hwid_cli.drive.motion.push import (
     shift,
     value_of,
 )
+from hwid_cli.drive.motion.runge_kutta import LONGEST_PHASE, runge_kutta_stage
 from hwid_cli.drive.motion.springs import beyond, beyond_side, reaches_side, spring_rate
 from hwid_cli.drive.motion.state import (
-    CIRCUIT,
     DEFLECTION,
     MOTOR_V,
     MOTOR_X,
     N_STATE,
     PART_V,
-    PART_X,
     TURNED_AT,
     WAY,
     V,
     X,
 )
+from hwid_cli.drive.motion.winding import is_wound, rate_of_winding, step_wound
 
 # Beyond this many Stribeck velocities the excess is below rounding, exp(-6.1^2); and
 # beyond this many yield lengths the hysteresis has yielded, exp(-37).
 FAST, FAR = 6.1, 37.0
-# A step is so short that no smooth force turns by more than this, [rad].
-LONGEST_PHASE = 0.3
 # Forces of formulas are differentiated over this share of the largest displacement, and
 # of the velocity that it has at this rate, [1/s].
 OWN_SHARE, OWN_RATE = 1e-4, 30.0
@@ -56,8 +54,6 @@ JUST_IN = 1e-300
 # A step within which drag settles so often is taken implicitly: Runge-Kutta steps explode
 # from 2.8 on.
 SETTLES = 2.0
-# Steps in a sample that a winding asks for at most, whose fast part is followed exactly.
-WINDING_STEPS = 2.0
 # A contact's force begins with an edge in its slope: its steps are this much shorter.
 CONTACT_FINER = 2.0
 
@@ -71,35 +67,6 @@ def is_always_curved(p: np.ndarray) -> bool:
     p : ndarray, shape (N_SLOTS,)
     """
     return is_force_curved(p) or (depends_on_motion(p) and has_losses(p))
-
-
-@compiled(**INNER)
-def is_wound(p: np.ndarray) -> bool:
-    """Return whether a winding's fast part is followed exactly.
-
-    Then steps need not be as short as it is fast; beside a limit they have to.
-
-    Parameters
-    ----------
-    p : ndarray, shape (N_SLOTS,)
-    """
-    is_winding = p[slots.RESISTANCE] > 0.0 and p[slots.INDUCTANCE] > 0.0
-    return is_winding and p[slots.CLIP_LIMIT] == np.inf
-
-
-@compiled(**INNER)
-def slow_pace(fast: float, phase: float, p: np.ndarray) -> float:
-    """Return at which rate a winding is looked at that settles at another one, [1/s].
-
-    Parameters
-    ----------
-    fast : float, [1/s]
-        Rate at which it settles.
-    phase : float, [rad]
-        By which a step may turn at most.
-    p : ndarray, shape (N_SLOTS,)
-    """
-    return min(fast, WINDING_STEPS * phase / p[slots.SAMPLE_TIME])
 
 
 @compiled(**INNER)
@@ -252,7 +219,7 @@ def step_limit(
     if p[slots.INDUCTANCE] > 0.0:
         fast = p[slots.RESISTANCE] / p[slots.INDUCTANCE]
         if is_wound(p):
-            fast = _rate_of_winding(fast, state, memory, push, done, p)
+            fast = rate_of_winding(fast, state, memory, push, done, p)
         rate += fast
     if p[slots.HYSTERESIS_FORCE] != 0.0:
         rate += _rate_of_yielding(state, memory, mass, p)
@@ -267,35 +234,6 @@ def step_limit(
         pull = abs(acceleration(state, memory, push, done, p)[0])
         rate += abs(p[slots.STATIC_EXCESS]) / (mass * slow) + 0.5 * pull / slow
     return LONGEST_PHASE / max(rate, 1e-9)
-
-
-@compiled(**INNER)
-def _rate_of_winding(
-    fast: float,
-    state: np.ndarray,
-    memory: np.ndarray,
-    push: np.ndarray,
-    done: float,
-    p: np.ndarray,
-) -> float:
-    """Return how fast a current has to be followed that settles at the rate ``fast``.
-
-    Where its force is no constant times it, what has not settled yet decides that.
-    """
-    slow = slow_pace(fast, LONGEST_PHASE, p)
-    if slow == fast or (p[slots.DRIVE_VARIES] == 0.0 and not has_losses(p)):
-        return slow
-    has_motor = p[slots.GEAR_STIFFNESS] > 0.0
-    speed = state[MOTOR_V] if has_motor else state[V]
-    gain, motor, _, _ = acceleration(state, memory, push, done, p)
-    value, trend, _, _ = shift(push, DRIVE, done)
-    across = value - p[slots.BACK_EMF] * speed
-    trend -= p[slots.BACK_EMF] * (motor if has_motor else gain)
-    drop = p[slots.RESISTANCE] * state[CIRCUIT]
-    # What it is behind a voltage that changes evenly, it stays behind.
-    unsettled = abs(drop - across + trend / fast)
-    share = unsettled / max(abs(drop) + abs(across), 1e-300)
-    return max(slow, fast * np.sqrt(np.sqrt(min(share, 1.0))))
 
 
 @compiled(**INNER)
@@ -477,26 +415,6 @@ def _step_in_drag(
 
 
 @compiled(**INNER)
-def runge_kutta_stage(stage: int, h: float) -> tuple[float, float, float]:
-    """Return a stage's time in the step, its weight, and the way to the next one.
-
-    Parameters
-    ----------
-    h : float, [s]
-        Length of the step.
-
-    Returns
-    -------
-    tuple of float, [s], [sixths of the step], [s]
-    """
-    if stage == 0:
-        return 0.0, 1.0, 0.5 * h
-    if stage == 3:
-        return h, 1.0, 0.5 * h
-    return 0.5 * h, 2.0, h if stage == 2 else 0.5 * h
-
-
-@compiled(**INNER)
 def _step_varying(
     x: float,
     v: float,
@@ -555,7 +473,7 @@ def step_all(
         _step_coupled(state, trial, memory, push, done, h, is_held, p)
         return
     if is_wound(p):
-        _step_wound(state, trial, memory, push, done, h, is_held, p)
+        step_wound(state, trial, memory, push, done, h, is_held, p)
         return
     total, slope = np.zeros(N_STATE), np.empty(N_STATE)
     for n in range(N_STATE):
@@ -611,103 +529,3 @@ def _step_coupled(
     sixth = h / 6.0
     trial[X], trial[V] = x0 + sixth * dx, v0 + sixth * dv
     trial[MOTOR_X], trial[MOTOR_V] = xm0 + sixth * dxm, vm0 + sixth * dvm
-
-
-@compiled(**INNER)
-def _step_wound(
-    state: np.ndarray,
-    trial: np.ndarray,
-    memory: np.ndarray,
-    push: np.ndarray,
-    done: float,
-    h: float,
-    is_held: bool,
-    p: np.ndarray,
-) -> None:
-    """Step of a drive behind a winding, however fast its current settles.
-
-    The current takes an exponential Runge-Kutta step (ETDRK4: Cox, Matthews 2002); in
-    place of position and velocity of what it drives their sums with the current are
-    followed, which its fast part does not push. docs/method_diagnosis.md, eq. (D7a).
-    """
-    pace = p[slots.RESISTANCE] / p[slots.INDUCTANCE]
-    of_mass, of_motor = _pushed_by_current(pace, is_held, p)
-    half, half1, _, _ = _fading(0.5 * pace * h)
-    whole, whole1, whole2, whole3 = _fading(pace * h)
-    half1 *= 0.5 * h
-    outer, inner = whole1 - 3.0 * whole2 + 4.0 * whole3, 2.0 * (whole2 - 2.0 * whole3)
-    i0 = i = first = state[CIRCUIT]
-    x0, v0 = state[X] - of_mass / pace * i, state[V] + of_mass * i
-    xm0, vm0 = state[MOTOR_X] - of_motor / pace * i, state[MOTOR_V] + of_motor * i
-    di = dx = dv = dxm = dvm = dxp = dvp = rate0 = 0.0
-    for n in range(N_STATE):
-        trial[n] = state[n]
-    for stage in range(4):
-        after, weight, way = runge_kutta_stage(stage, h)
-        a, am, ap, rise = acceleration(trial, memory, push, done + after, p)
-        rate = rise + pace * i
-        a, am = a + of_mass * rise, am + of_motor * rise
-        v, vp = trial[V] - of_mass / pace * rise, trial[PART_V]
-        vm = trial[MOTOR_V] - of_motor / pace * rise
-        if is_held:
-            v = a = 0.0
-        dx, dv, dxm = dx + weight * v, dv + weight * a, dxm + weight * vm
-        dvm, dxp, dvp = dvm + weight * am, dxp + weight * vp, dvp + weight * ap
-        if stage == 0:
-            rate0, di = rate, outer * rate
-            i = first = half * i0 + half1 * rate
-        elif stage == 1:
-            di += inner * rate
-            i = half * i0 + half1 * rate
-        elif stage == 2:
-            di += inner * rate
-            i = half * first + half1 * (2.0 * rate - rate0)
-        else:
-            i = whole * i0 + h * (di + (4.0 * whole3 - whole2) * rate)
-            way, v, a, vm, am, vp, ap = h / 6.0, dx, dv, dxm, dvm, dxp, dvp
-        trial[CIRCUIT] = i
-        trial[X], trial[V] = (
-            x0 + way * v + of_mass / pace * i,
-            v0 + way * a - of_mass * i,
-        )
-        trial[MOTOR_X] = xm0 + way * vm + of_motor / pace * i
-        trial[MOTOR_V] = vm0 + way * am - of_motor * i
-        trial[PART_X] = state[PART_X] + way * vp
-        trial[PART_V] = state[PART_V] + way * ap
-    if of_motor == 0.0:
-        # A motor that is part of the mass.
-        trial[MOTOR_X], trial[MOTOR_V] = trial[X], trial[V]
-
-
-@compiled(**INNER)
-def _pushed_by_current(
-    pace: float, is_held: bool, p: np.ndarray
-) -> tuple[float, float]:
-    """Return the speed that an ampere that dies away gives the mass, and the motor."""
-    if p[slots.GEAR_STIFFNESS] > 0.0:
-        motor = p[slots.MASS] * p[slots.MOTOR_SHARE]
-        return 0.0, p[slots.FORCE_CONSTANT] / (pace * motor)
-    return 0.0 if is_held else p[slots.FORCE_CONSTANT] / (pace * p[slots.MASS]), 0.0
-
-
-@compiled(**INNER)
-def _fading(turns: float) -> tuple[float, float, float, float]:
-    """Return exp(-z) and the functions phi_1 to phi_3 of exponential integrators at -z.
-
-    Parameters
-    ----------
-    turns : float, [-]
-        z, not negative.
-    """
-    rest = np.exp(-turns)
-    if turns > 1.0:
-        first = (1.0 - rest) / turns
-        second = (1.0 - first) / turns
-        return rest, first, second, (0.5 - second) / turns
-    # Small differences of large numbers there: a series in place of them.
-    third, term = 0.0, 1.0 / 6.0
-    for n in range(4, 18):
-        third += term
-        term *= -turns / n
-    second = 0.5 - turns * third
-    return rest, 1.0 - turns * second, second, third

@@ -14,12 +14,7 @@ from hwid_cli.drive import slots
 from hwid_cli.drive.command import MOST_PIECES, static_command
 from hwid_cli.drive.controller import N_CONTROL, controlled, is_closed
 from hwid_cli.drive.motion.corners import corner_of, count_edges
-from hwid_cli.drive.motion.curved import (
-    is_always_curved,
-    is_wound,
-    slow_pace,
-    step_limit,
-)
+from hwid_cli.drive.motion.curved import is_always_curved, step_limit
 from hwid_cli.drive.motion.events import (
     EDGE,
     LEAVING,
@@ -62,6 +57,7 @@ from hwid_cli.drive.motion.state import (
     V,
     X,
 )
+from hwid_cli.drive.motion.winding import is_wound, slow_pace
 
 # Where events are watched, a step turns nothing by more than this, [rad]: a longer one
 # could go there and back.

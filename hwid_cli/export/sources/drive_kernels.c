@@ -1955,9 +1955,15 @@ static double drive_margin(double *state, double command, int corner, double *p)
     return left;
 }
 
-static int drive_is_always_curved(double *p)
+static tuple_ddd drive_runge_kutta_stage(int stage, double h)
 {
-    return drive_is_force_curved(p) || (drive_depends_on_motion(p) && drive_has_losses(p));
+    if (stage == 0) {
+        return (tuple_ddd){0.0, 1.0, 0.5 * h};
+    }
+    if (stage == 3) {
+        return (tuple_ddd){h, 1.0, 0.5 * h};
+    }
+    return (tuple_ddd){0.5 * h, 2.0, (stage == 2) ? h : (0.5 * h)};
 }
 
 static int drive_is_wound(double *p)
@@ -1970,6 +1976,240 @@ static int drive_is_wound(double *p)
 static double drive_slow_pace(double fast, double phase, double *p)
 {
     return least(fast, (2.0 * phase) / p[SAMPLE_TIME]);
+}
+
+static double drive_rate_of_winding(double fast, double *state, double *memory, double *push, double done, double *p)
+{
+    double slow = 0.0;
+    int has_motor = 0;
+    double speed = 0.0;
+    tuple_dddd t1 = {0};
+    double gain = 0.0;
+    double motor = 0.0;
+    tuple_dddd t2 = {0};
+    double value = 0.0;
+    double trend = 0.0;
+    double across = 0.0;
+    double drop = 0.0;
+    double unsettled = 0.0;
+    double share = 0.0;
+    slow = drive_slow_pace(fast, 0.3, p);
+    if ((slow == fast) || ((p[DRIVE_VARIES] == 0.0) && (!drive_has_losses(p)))) {
+        return slow;
+    }
+    has_motor = p[GEAR_STIFFNESS] > 0.0;
+    speed = has_motor ? state[MOTOR_V] : state[V];
+    t1 = drive_acceleration(state, memory, push, done, p);
+    gain = t1.m0;
+    motor = t1.m1;
+    t2 = drive_shift(push, DRIVE, done);
+    value = t2.m0;
+    trend = t2.m1;
+    across = value - (p[BACK_EMF] * speed);
+    trend -= p[BACK_EMF] * (has_motor ? motor : gain);
+    drop = p[RESISTANCE] * state[CIRCUIT];
+    unsettled = fabs((drop - across) + (trend / fast));
+    share = unsettled / most(fabs(drop) + fabs(across), 1e-300);
+    return most(slow, fast * sqrt(sqrt(least(share, 1.0))));
+}
+
+static tuple_dd drive_pushed_by_current(double pace, int is_held, double *p)
+{
+    double motor = 0.0;
+    if (p[GEAR_STIFFNESS] > 0.0) {
+        motor = p[MASS] * p[MOTOR_SHARE];
+        return (tuple_dd){0.0, p[FORCE_CONSTANT] / (pace * motor)};
+    }
+    return (tuple_dd){is_held ? 0.0 : (p[FORCE_CONSTANT] / (pace * p[MASS])), 0.0};
+}
+
+static tuple_dddd drive_fading(double turns)
+{
+    double rest = 0.0;
+    double first = 0.0;
+    double second = 0.0;
+    double third = 0.0;
+    double term = 0.0;
+    int n = 0;
+    rest = exp(-turns);
+    if (turns > 1.0) {
+        first = (1.0 - rest) / turns;
+        second = (1.0 - first) / turns;
+        return (tuple_dddd){rest, first, second, (0.5 - second) / turns};
+    }
+    third = 0.0;
+    term = 1.0 / 6.0;
+    for (n = 4; n < 18; ++n) {
+        third += term;
+        term *= (-turns) / n;
+    }
+    second = 0.5 - (turns * third);
+    return (tuple_dddd){rest, 1.0 - (turns * second), second, third};
+}
+
+static void drive_step_wound(double *state, double *trial, double *memory, double *push, double done, double h, int is_held, double *p)
+{
+    double pace = 0.0;
+    tuple_dd t1 = {0};
+    double of_mass = 0.0;
+    double of_motor = 0.0;
+    tuple_dddd t2 = {0};
+    double half = 0.0;
+    double half1 = 0.0;
+    tuple_dddd t3 = {0};
+    double whole = 0.0;
+    double whole1 = 0.0;
+    double whole2 = 0.0;
+    double whole3 = 0.0;
+    double outer = 0.0;
+    double inner = 0.0;
+    double first = 0.0;
+    double i0 = 0.0;
+    double i = 0.0;
+    double x0 = 0.0;
+    double v0 = 0.0;
+    double xm0 = 0.0;
+    double vm0 = 0.0;
+    double rate0 = 0.0;
+    double di = 0.0;
+    double dx = 0.0;
+    double dv = 0.0;
+    double dxm = 0.0;
+    double dvm = 0.0;
+    double dxp = 0.0;
+    double dvp = 0.0;
+    int n = 0;
+    int stage = 0;
+    tuple_ddd t4 = {0};
+    double after = 0.0;
+    double weight = 0.0;
+    double way = 0.0;
+    tuple_dddd t5 = {0};
+    double a = 0.0;
+    double am = 0.0;
+    double ap = 0.0;
+    double rise = 0.0;
+    double rate = 0.0;
+    double t6 = 0.0;
+    double t7 = 0.0;
+    double v = 0.0;
+    double vp = 0.0;
+    double vm = 0.0;
+    double t8 = 0.0;
+    double t9 = 0.0;
+    double t10 = 0.0;
+    double t11 = 0.0;
+    double t12 = 0.0;
+    double t13 = 0.0;
+    pace = p[RESISTANCE] / p[INDUCTANCE];
+    t1 = drive_pushed_by_current(pace, is_held, p);
+    of_mass = t1.m0;
+    of_motor = t1.m1;
+    t2 = drive_fading((0.5 * pace) * h);
+    half = t2.m0;
+    half1 = t2.m1;
+    t3 = drive_fading(pace * h);
+    whole = t3.m0;
+    whole1 = t3.m1;
+    whole2 = t3.m2;
+    whole3 = t3.m3;
+    half1 *= 0.5 * h;
+    outer = (whole1 - (3.0 * whole2)) + (4.0 * whole3);
+    inner = 2.0 * (whole2 - (2.0 * whole3));
+    first = state[CIRCUIT];
+    i0 = first;
+    i = first;
+    x0 = state[X] - ((of_mass / pace) * i);
+    v0 = state[V] + (of_mass * i);
+    xm0 = state[MOTOR_X] - ((of_motor / pace) * i);
+    vm0 = state[MOTOR_V] + (of_motor * i);
+    rate0 = 0.0;
+    di = rate0;
+    dx = rate0;
+    dv = rate0;
+    dxm = rate0;
+    dvm = rate0;
+    dxp = rate0;
+    dvp = rate0;
+    for (n = 0; n < N_STATE; ++n) {
+        trial[n] = state[n];
+    }
+    for (stage = 0; stage < 4; ++stage) {
+        t4 = drive_runge_kutta_stage(stage, h);
+        after = t4.m0;
+        weight = t4.m1;
+        way = t4.m2;
+        t5 = drive_acceleration(trial, memory, push, done + after, p);
+        a = t5.m0;
+        am = t5.m1;
+        ap = t5.m2;
+        rise = t5.m3;
+        rate = rise + (pace * i);
+        t6 = a + (of_mass * rise);
+        t7 = am + (of_motor * rise);
+        a = t6;
+        am = t7;
+        v = trial[V] - ((of_mass / pace) * rise);
+        vp = trial[PART_V];
+        vm = trial[MOTOR_V] - ((of_motor / pace) * rise);
+        if (is_held) {
+            a = 0.0;
+            v = a;
+        }
+        t8 = dx + (weight * v);
+        t9 = dv + (weight * a);
+        t10 = dxm + (weight * vm);
+        dx = t8;
+        dv = t9;
+        dxm = t10;
+        t11 = dvm + (weight * am);
+        t12 = dxp + (weight * vp);
+        t13 = dvp + (weight * ap);
+        dvm = t11;
+        dxp = t12;
+        dvp = t13;
+        if (stage == 0) {
+            rate0 = rate;
+            di = outer * rate;
+            first = (half * i0) + (half1 * rate);
+            i = first;
+        } else {
+            if (stage == 1) {
+                di += inner * rate;
+                i = (half * i0) + (half1 * rate);
+            } else {
+                if (stage == 2) {
+                    di += inner * rate;
+                    i = (half * first) + (half1 * ((2.0 * rate) - rate0));
+                } else {
+                    i = (whole * i0) + (h * (di + (((4.0 * whole3) - whole2) * rate)));
+                    way = h / 6.0;
+                    v = dx;
+                    a = dv;
+                    vm = dxm;
+                    am = dvm;
+                    vp = dxp;
+                    ap = dvp;
+                }
+            }
+        }
+        trial[CIRCUIT] = i;
+        trial[X] = (x0 + (way * v)) + ((of_mass / pace) * i);
+        trial[V] = (v0 + (way * a)) - (of_mass * i);
+        trial[MOTOR_X] = (xm0 + (way * vm)) + ((of_motor / pace) * i);
+        trial[MOTOR_V] = (vm0 + (way * am)) - (of_motor * i);
+        trial[PART_X] = state[PART_X] + (way * vp);
+        trial[PART_V] = state[PART_V] + (way * ap);
+    }
+    if (of_motor == 0.0) {
+        trial[MOTOR_X] = trial[X];
+        trial[MOTOR_V] = trial[V];
+    }
+}
+
+static int drive_is_always_curved(double *p)
+{
+    return drive_is_force_curved(p) || (drive_depends_on_motion(p) && drive_has_losses(p));
 }
 
 static int drive_touches(double x, double *p)
@@ -2212,41 +2452,6 @@ static double drive_rate_of_own(double *state, double *memory, double *push, dou
     return rate;
 }
 
-static double drive_rate_of_winding(double fast, double *state, double *memory, double *push, double done, double *p)
-{
-    double slow = 0.0;
-    int has_motor = 0;
-    double speed = 0.0;
-    tuple_dddd t1 = {0};
-    double gain = 0.0;
-    double motor = 0.0;
-    tuple_dddd t2 = {0};
-    double value = 0.0;
-    double trend = 0.0;
-    double across = 0.0;
-    double drop = 0.0;
-    double unsettled = 0.0;
-    double share = 0.0;
-    slow = drive_slow_pace(fast, 0.3, p);
-    if ((slow == fast) || ((p[DRIVE_VARIES] == 0.0) && (!drive_has_losses(p)))) {
-        return slow;
-    }
-    has_motor = p[GEAR_STIFFNESS] > 0.0;
-    speed = has_motor ? state[MOTOR_V] : state[V];
-    t1 = drive_acceleration(state, memory, push, done, p);
-    gain = t1.m0;
-    motor = t1.m1;
-    t2 = drive_shift(push, DRIVE, done);
-    value = t2.m0;
-    trend = t2.m1;
-    across = value - (p[BACK_EMF] * speed);
-    trend -= p[BACK_EMF] * (has_motor ? motor : gain);
-    drop = p[RESISTANCE] * state[CIRCUIT];
-    unsettled = fabs((drop - across) + (trend / fast));
-    share = unsettled / most(fabs(drop) + fabs(across), 1e-300);
-    return most(slow, fast * sqrt(sqrt(least(share, 1.0))));
-}
-
 static double drive_step_limit(double *state, double *memory, double *push, double done, double *p)
 {
     double mass = 0.0;
@@ -2345,17 +2550,6 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
         rate += (fabs(p[STATIC_EXCESS]) / (mass * slow)) + ((0.5 * pull) / slow);
     }
     return 0.3 / most(rate, 1e-09);
-}
-
-static tuple_ddd drive_runge_kutta_stage(int stage, double h)
-{
-    if (stage == 0) {
-        return (tuple_ddd){0.0, 1.0, 0.5 * h};
-    }
-    if (stage == 3) {
-        return (tuple_ddd){h, 1.0, 0.5 * h};
-    }
-    return (tuple_ddd){0.5 * h, 2.0, (stage == 2) ? h : (0.5 * h)};
 }
 
 static tuple_dd drive_step_varying(double x, double v, double *memory, double *push, double done, double h, double *p)
@@ -2560,200 +2754,6 @@ static void drive_step_coupled(double *state, double *trial, double *memory, dou
     trial[V] = v0 + (sixth * dv);
     trial[MOTOR_X] = xm0 + (sixth * dxm);
     trial[MOTOR_V] = vm0 + (sixth * dvm);
-}
-
-static tuple_dd drive_pushed_by_current(double pace, int is_held, double *p)
-{
-    double motor = 0.0;
-    if (p[GEAR_STIFFNESS] > 0.0) {
-        motor = p[MASS] * p[MOTOR_SHARE];
-        return (tuple_dd){0.0, p[FORCE_CONSTANT] / (pace * motor)};
-    }
-    return (tuple_dd){is_held ? 0.0 : (p[FORCE_CONSTANT] / (pace * p[MASS])), 0.0};
-}
-
-static tuple_dddd drive_fading(double turns)
-{
-    double rest = 0.0;
-    double first = 0.0;
-    double second = 0.0;
-    double third = 0.0;
-    double term = 0.0;
-    int n = 0;
-    rest = exp(-turns);
-    if (turns > 1.0) {
-        first = (1.0 - rest) / turns;
-        second = (1.0 - first) / turns;
-        return (tuple_dddd){rest, first, second, (0.5 - second) / turns};
-    }
-    third = 0.0;
-    term = 1.0 / 6.0;
-    for (n = 4; n < 18; ++n) {
-        third += term;
-        term *= (-turns) / n;
-    }
-    second = 0.5 - (turns * third);
-    return (tuple_dddd){rest, 1.0 - (turns * second), second, third};
-}
-
-static void drive_step_wound(double *state, double *trial, double *memory, double *push, double done, double h, int is_held, double *p)
-{
-    double pace = 0.0;
-    tuple_dd t1 = {0};
-    double of_mass = 0.0;
-    double of_motor = 0.0;
-    tuple_dddd t2 = {0};
-    double half = 0.0;
-    double half1 = 0.0;
-    tuple_dddd t3 = {0};
-    double whole = 0.0;
-    double whole1 = 0.0;
-    double whole2 = 0.0;
-    double whole3 = 0.0;
-    double outer = 0.0;
-    double inner = 0.0;
-    double first = 0.0;
-    double i0 = 0.0;
-    double i = 0.0;
-    double x0 = 0.0;
-    double v0 = 0.0;
-    double xm0 = 0.0;
-    double vm0 = 0.0;
-    double rate0 = 0.0;
-    double di = 0.0;
-    double dx = 0.0;
-    double dv = 0.0;
-    double dxm = 0.0;
-    double dvm = 0.0;
-    double dxp = 0.0;
-    double dvp = 0.0;
-    int n = 0;
-    int stage = 0;
-    tuple_ddd t4 = {0};
-    double after = 0.0;
-    double weight = 0.0;
-    double way = 0.0;
-    tuple_dddd t5 = {0};
-    double a = 0.0;
-    double am = 0.0;
-    double ap = 0.0;
-    double rise = 0.0;
-    double rate = 0.0;
-    double t6 = 0.0;
-    double t7 = 0.0;
-    double v = 0.0;
-    double vp = 0.0;
-    double vm = 0.0;
-    double t8 = 0.0;
-    double t9 = 0.0;
-    double t10 = 0.0;
-    double t11 = 0.0;
-    double t12 = 0.0;
-    double t13 = 0.0;
-    pace = p[RESISTANCE] / p[INDUCTANCE];
-    t1 = drive_pushed_by_current(pace, is_held, p);
-    of_mass = t1.m0;
-    of_motor = t1.m1;
-    t2 = drive_fading((0.5 * pace) * h);
-    half = t2.m0;
-    half1 = t2.m1;
-    t3 = drive_fading(pace * h);
-    whole = t3.m0;
-    whole1 = t3.m1;
-    whole2 = t3.m2;
-    whole3 = t3.m3;
-    half1 *= 0.5 * h;
-    outer = (whole1 - (3.0 * whole2)) + (4.0 * whole3);
-    inner = 2.0 * (whole2 - (2.0 * whole3));
-    first = state[CIRCUIT];
-    i0 = first;
-    i = first;
-    x0 = state[X] - ((of_mass / pace) * i);
-    v0 = state[V] + (of_mass * i);
-    xm0 = state[MOTOR_X] - ((of_motor / pace) * i);
-    vm0 = state[MOTOR_V] + (of_motor * i);
-    rate0 = 0.0;
-    di = rate0;
-    dx = rate0;
-    dv = rate0;
-    dxm = rate0;
-    dvm = rate0;
-    dxp = rate0;
-    dvp = rate0;
-    for (n = 0; n < N_STATE; ++n) {
-        trial[n] = state[n];
-    }
-    for (stage = 0; stage < 4; ++stage) {
-        t4 = drive_runge_kutta_stage(stage, h);
-        after = t4.m0;
-        weight = t4.m1;
-        way = t4.m2;
-        t5 = drive_acceleration(trial, memory, push, done + after, p);
-        a = t5.m0;
-        am = t5.m1;
-        ap = t5.m2;
-        rise = t5.m3;
-        rate = rise + (pace * i);
-        t6 = a + (of_mass * rise);
-        t7 = am + (of_motor * rise);
-        a = t6;
-        am = t7;
-        v = trial[V] - ((of_mass / pace) * rise);
-        vp = trial[PART_V];
-        vm = trial[MOTOR_V] - ((of_motor / pace) * rise);
-        if (is_held) {
-            a = 0.0;
-            v = a;
-        }
-        t8 = dx + (weight * v);
-        t9 = dv + (weight * a);
-        t10 = dxm + (weight * vm);
-        dx = t8;
-        dv = t9;
-        dxm = t10;
-        t11 = dvm + (weight * am);
-        t12 = dxp + (weight * vp);
-        t13 = dvp + (weight * ap);
-        dvm = t11;
-        dxp = t12;
-        dvp = t13;
-        if (stage == 0) {
-            rate0 = rate;
-            di = outer * rate;
-            first = (half * i0) + (half1 * rate);
-            i = first;
-        } else {
-            if (stage == 1) {
-                di += inner * rate;
-                i = (half * i0) + (half1 * rate);
-            } else {
-                if (stage == 2) {
-                    di += inner * rate;
-                    i = (half * first) + (half1 * ((2.0 * rate) - rate0));
-                } else {
-                    i = (whole * i0) + (h * (di + (((4.0 * whole3) - whole2) * rate)));
-                    way = h / 6.0;
-                    v = dx;
-                    a = dv;
-                    vm = dxm;
-                    am = dvm;
-                    vp = dxp;
-                    ap = dvp;
-                }
-            }
-        }
-        trial[CIRCUIT] = i;
-        trial[X] = (x0 + (way * v)) + ((of_mass / pace) * i);
-        trial[V] = (v0 + (way * a)) - (of_mass * i);
-        trial[MOTOR_X] = (xm0 + (way * vm)) + ((of_motor / pace) * i);
-        trial[MOTOR_V] = (vm0 + (way * am)) - (of_motor * i);
-        trial[PART_X] = state[PART_X] + (way * vp);
-        trial[PART_V] = state[PART_V] + (way * ap);
-    }
-    if (of_motor == 0.0) {
-        trial[MOTOR_X] = trial[X];
-        trial[MOTOR_V] = trial[V];
-    }
 }
 
 static void drive_step_all(double *state, double *trial, double *memory, double *push, double done, double h, int is_held, double *p)
