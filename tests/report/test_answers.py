@@ -465,3 +465,11 @@ def test_results_of_calibration_alone_say_what_to_run():
 
     assert found.verdict.startswith("No model yet")
     assert ("Fit models to them:", "hwid identify CONFIG") in found.next_steps
+
+
+@pytest.mark.parametrize("verdict", ["none", "parameters"])
+def test_what_measuring_added_stands_below_the_answer(verdict):
+    plain = nothing_missing(verdict)
+    late = answer_to(replace(plain, remains="late_input"))
+    assert any("the input stands one sample later" in one for one in late.details)
+    assert not any("What is left is" in one for one in answer_to(plain).details)

@@ -85,7 +85,11 @@ def _answer_of_record(record: Diagnosis) -> Answer:
         verdict_in_words(record),
         is_settled=record.verdict in _SETTLED
         and (record.complete or record.verdict != "named"),
-        details=(_gap_in_words(record), *warning_sentences(record.warnings)),
+        details=(
+            _gap_in_words(record),
+            *_of_measuring(record),
+            *warning_sentences(record.warnings),
+        ),
         blocks=tuple(blocks),
         next_steps=_next(record),
     )
@@ -115,6 +119,14 @@ def verdict_in_words(diagnosis: Diagnosis) -> str:
     if diagnosis.verdict == "none":
         return "Nothing is missing: the simulation agrees with the measurements up to their noise."
     return diagnosis.summary
+
+
+def _of_measuring(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """What measuring has added, where no effect is missing."""
+    is_nothing = diagnosis.verdict in ("parameters", "none")
+    if not (is_nothing and diagnosis.remains in CAUSES):
+        return ()
+    return (f"What is left is {CAUSES[diagnosis.remains]}.",)
 
 
 def _rest(diagnosis: Diagnosis) -> str:
