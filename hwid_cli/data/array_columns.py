@@ -109,6 +109,9 @@ def _places_of_units(name: str) -> list[str]:
         places += [f"{parent}{mark}{word}{other}{last}" for other in (mark or ".", ".")]
         if last in _VALUES and parent:
             places.append(f"{parent}{mark}{word}")
+    if last in _VALUES and parent:
+        # A time series of MATLAB that was made a struct.
+        places.append(f"{parent}{mark}DataInfo{mark}Units")
     return places
 
 

@@ -11,15 +11,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+# What instruments write where a signal is out of range, in lower case.
+OVER_RANGE_WORDS = frozenset(
+    [
+        *("∞", "+∞", "-∞", "overflow", "+overflow", "-overflow", "overrange"),
+        *("over range", "underrange", "under range", "overload", "ovld", "ol", "o.l"),
+        *("-ol", "+ol", "clipped"),
+    ]
+)
 # What programs write where they have no number, in lower case.
-MISSING_WORDS = frozenset(
+MISSING_WORDS = OVER_RANGE_WORDS | frozenset(
     [
         *("", "nan", "na", "n/a", "n.a.", "null", "none", "-", "--", "---", "-nan"),
         # Spreadsheets, in English and German.
         *("#n/a", "#nv", "#div/0!", "#value!", "#wert!", "#num!", "#zahl!", "#null!"),
         *("#ref!", "#bezug!", "#name?"),
-        # Out of an oscilloscope's range.
-        *("∞", "+∞", "-∞"),
+        # Historians of plants and OPC servers.
+        *("bad", "bad input", "no data", "i/o timeout", "comm fail"),
+        *("calc failed", "not connect", "scan off", "pt created"),
+        *("invalid", "no result", "bad quality"),
         # The library of C under Windows.
         *("1.#qnan", "-1.#qnan", "1.#ind", "-1.#ind", "nan(ind)", "-nan(ind)"),
     ]

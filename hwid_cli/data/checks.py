@@ -57,13 +57,13 @@ def check_numbers(path: Path, columns: FileColumns, *, may_miss: bool = False) -
 
 
 def _run_of(column: MeasuredColumn, index: int) -> str:
-    """What to say of more than one missing sample; one alone is bridged."""
+    """What to say of many missing samples; a few are bridged."""
     lost = missing(column)
     if not lost[index]:
         return ""
     run = int(np.argmin(np.append(lost[index:], False)))
     if run > 1:
-        return f", as are {run} rows together (one alone is bridged)"
+        return f", as are {run} rows together (a few are bridged)"
     if lost.sum() > 1:
         return f", as are {int(lost.sum())} rows in all (up to 1 % are bridged)"
     return ""

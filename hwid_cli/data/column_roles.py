@@ -21,7 +21,13 @@ from hwid_cli.data.column_words import (
     place_in_chain,
 )
 from hwid_cli.data.table_heads import sample_time_named
-from hwid_cli.data.units import factor_between, split_unit, unit_in_name, unit_of_dates
+from hwid_cli.data.units import (
+    factor_between,
+    looks_like_unit,
+    split_unit,
+    unit_in_name,
+    unit_of_dates,
+)
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.starter import FoundColumn, Role
 
@@ -147,7 +153,8 @@ def guess_time(columns: Sequence[FoundColumn]) -> TimeGuess:
         # Unless something beside it says its unit.
         if unit is None or (is_other and not why and not _is_in_time(column)):
             continue
-        named = "named so, and it grows evenly" if meaning.role else "it grows evenly"
+        grows = "it grows evenly" if clock.jitter <= signs.MOST_JITTER else "it grows"
+        named = f"named so, and {grows}" if meaning.role else grows
         role = Role(column.key, column.title, unit, named + why)
         is_rough = clock.jitter > ROUND_STAMPS
         return TimeGuess(role, None, is_rough, named + why, notes, column)
@@ -214,12 +221,14 @@ def clocks_of(
 
 
 def _clock_of(column: FoundColumn) -> signs.Clock | None:
-    """How a column ticks; one that is named after time may begin again."""
+    """How a column ticks; one that is named after time may begin again, or be uneven."""
     clock = signs.clock_of(column.values)
     named = meaning_of(column.title, column.unit).role == "time" or _is_in_time(column)
-    if clock is None and named and (begins := signs.restarts_of(column.values)):
+    if clock is not None or not named:
+        return clock
+    if begins := signs.restarts_of(column.values):
         return signs.clock_of(column.values[: begins[0]])
-    return clock
+    return signs.uneven_clock_of(column.values)
 
 
 def _is_in_time(column: FoundColumn) -> bool:
@@ -659,7 +668,9 @@ def _two_units_notes(first: FoundColumn, last: FoundColumn) -> list[str]:
     notes = []
     for role, one in (("input", first), ("output", last)):
         named = split_unit(one.title)[1]
-        if named and one.unit and factor_between(named, one.unit) is None:
+        # Brackets may hold anything else: a channel, an index.
+        is_unit = looks_like_unit(named)
+        if is_unit and one.unit and factor_between(named, one.unit) is None:
             notes.append(
                 f"NOT SURE: {_called(one)} says {named!r} and the row of units "
                 f"{one.unit!r}, which is taken; if the other one holds, write "

@@ -4,6 +4,7 @@ Signs, no proofs: they order the columns of a file that nobody has described, fo
 person to check. All are free of units.
 """
 
+from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +26,9 @@ _FEWEST_MEANS = 300
 _LINE_SHARE = 0.85
 # A step's levels hold for this share of all samples at least, [-].
 _HELD_SHARE = 0.8
-# Rows that are written twice are fewer than this share, [-].
-MOST_REPEATED = 0.01
+# Rows that are written twice, and rows with a stamp that does not fit, are fewer than
+# these shares, [-].
+MOST_REPEATED, MOST_ODD = 0.01, 0.02
 _FEWEST = 20
 # Recordings in one file, and the largest ratio of their steps.
 _MOST_RESTARTS, _SAME_STEP = 1000, 1.02
@@ -69,20 +71,89 @@ def clock_of(values: np.ndarray) -> Clock | None:
     >>> clock_of(np.arange(100.0) ** 2) is None
     True
     """
-    if values.size < _FEWEST or not np.isfinite(values).all():
+    steps = _growing_steps(values)
+    if steps is None:
         return None
-    steps = np.diff(values)
-    repeated = steps == 0.0
-    if np.mean(repeated) <= MOST_REPEATED:
-        # Rows that a logger wrote twice.
-        steps = np.diff(values[np.append(True, ~repeated)])
     median = float(np.median(steps))
-    if median <= 0 or not (steps > 0).all():
-        return None
     off = np.abs(steps - median) / median
     if np.mean(off > MOST_JITTER) > MOST_GAPS:
         return None
     return Clock(median, float(off.max()))
+
+
+def uneven_clock_of(values: np.ndarray) -> Clock | None:
+    """Clock of a column that grows, however unevenly: stamps of events.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+
+    Returns
+    -------
+    Clock or None
+        None for a column that does not grow throughout.
+
+    Examples
+    --------
+    >>> uneven_clock_of(np.cumsum(np.tile([1.0, 2.0, 5.0], 20))).step
+    2.0
+    """
+    steps = _growing_steps(values)
+    if steps is None:
+        return None
+    median = float(np.median(steps))
+    return Clock(median, float(np.max(np.abs(steps - median)) / median))
+
+
+def _growing_steps(values: np.ndarray) -> np.ndarray | None:
+    """Differences of a column that grows but for a few rows; None for another one."""
+    if values.size < _FEWEST or not np.isfinite(values).all():
+        return None
+    steps = np.diff(values)
+    if np.median(steps) <= 0 or np.mean(steps <= 0) > MOST_ODD:
+        return None
+    # Rows that a logger wrote twice, or with a damaged stamp.
+    fits = growing_rows(values)
+    return np.diff(values[fits]) if np.mean(~fits) <= MOST_ODD else None
+
+
+def growing_rows(values: np.ndarray) -> np.ndarray:
+    """Rows of the longest part of a column that grows throughout.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Finite.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+
+    Examples
+    --------
+    >>> growing_rows(np.array([0.0, 1.0, 1.0, 2.0, 9.0, 3.0]))
+    array([ True,  True, False,  True, False,  True])
+    """
+    if (np.diff(values) > 0).all():
+        return np.ones(values.size, dtype=bool)
+    # Patience sorting: the smallest end of a growing part of each length, and the row
+    # before each row.
+    ends: list[float] = []
+    rows: list[int] = []
+    before = np.full(values.size, -1)
+    for row, value in enumerate(values.tolist()):
+        length = bisect_left(ends, value)
+        if ends[length : length + 1] == [value]:
+            # Of equal ones the first stays.
+            continue
+        before[row] = rows[length - 1] if length else -1
+        ends[length : length + 1], rows[length : length + 1] = [value], [row]
+    found = np.zeros(values.size, dtype=bool)
+    row = rows[-1]
+    while row >= 0:
+        found[row] = True
+        row = int(before[row])
+    return found
 
 
 def coarse_clock_of(values: np.ndarray) -> float | None:

@@ -11,8 +11,9 @@ the text.
 
 import codecs
 import csv
+import logging
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain, islice, repeat
@@ -22,11 +23,18 @@ from typing import TextIO
 import numpy as np
 
 from hwid_cli.data.cells import is_stamp, is_word
-from hwid_cli.data.columns import ROLES, MeasuredColumn
+from hwid_cli.data.columns import ROLES, MeasuredColumn, keep_rows
 from hwid_cli.data.header_stamps import (
     joined_stamp,
     split_stamps,
     with_joined_stamps,
+)
+from hwid_cli.data.long_tables import (
+    LongTable,
+    columns_of_long,
+    long_form_of,
+    long_tables,
+    pick_from_long,
 )
 from hwid_cli.data.table_columns import (
     ColumnParts,
@@ -40,6 +48,8 @@ from hwid_cli.errors import MeasurementError, MissingColumnError
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.starter import FoundColumn
 
+_log = logging.getLogger(__name__)
+
 # Semicolons and tabs come first: with decimal commas a comma is no separator. The blank
 # stands for any number of them.
 _SEPARATORS = ("\t", ";", ",", "|", " ")
@@ -52,6 +62,8 @@ _PLAIN_LINES = 24
 _BLOCK_LINES = 4096
 # Rows that end early are torn while they are fewer than this share, [-].
 _MOST_TORN = 0.02
+# Rows of values behind their names that are damaged and left out, at most, [-].
+_MOST_DAMAGED = 0.02
 # The csv module reads no longer cell, and says so.
 _LONGEST_LINE = 2**16
 _READ_BYTES = 2**20
@@ -121,6 +133,9 @@ def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredCo
         role: key for role in ROLES if (key := getattr(columns, role)) is not None
     }
     sheet = _read_sheet(path, [key for key in wanted.values() if isinstance(key, str)])
+    tables = _long_tables(sheet, wanted)
+    if tables:
+        return pick_from_long(str(path), columns, tables)
     stamps = split_stamps(sheet.head.names)
     split = {role: stamps[key] for role, key in wanted.items() if key in stamps}
     places = {
@@ -164,10 +179,55 @@ def list_csv_columns(path: Path) -> tuple[FoundColumn, ...]:
     head = sheet.head
     if head.body == len(sheet.rows):
         return ()
+    if tables := _long_tables(sheet):
+        return columns_of_long(tables)
     width = max(map(len, sheet.rows[head.body :]))
     places = [place for place in range(width) if place not in head.texts]
     read = _read_body(sheet, {place: f"column {place}" for place in places})
     return with_joined_stamps(found_columns(read, head))
+
+
+def _long_tables(
+    sheet: _Sheet, wanted: Mapping[str, str | int] | None = None
+) -> tuple[LongTable, ...]:
+    """Tables of a file whose rows name their signals; none where they do not.
+
+    Parameters
+    ----------
+    wanted : mapping of str to (str or int) or None
+        Columns that are asked for: where the head names them all, they are meant.
+    """
+    head = sheet.head
+    form = long_form_of(head.names, head.texts)
+    asked = [] if wanted is None else list(wanted.values())
+    if form is None or (asked and all(_is_in_head(key, head) for key in asked)):
+        return ()
+    read = _read_body(sheet, {form.time: "time", form.value: "value"})
+    time, value = read[form.time], read[form.value]
+    n = min(time.values.size, value.values.size)
+    time, value = keep_rows(time, slice(n)), keep_rows(value, slice(n))
+    words = _words_of(sheet, (form.name, *form.others), value.rows)
+    return long_tables(head.names[form.time], time, value, words, form)
+
+
+def _is_in_head(key: str | int, head: TableHead) -> bool:
+    return isinstance(key, int) or key in head.names
+
+
+def _words_of(
+    sheet: _Sheet, places: Sequence[int], lines: np.ndarray
+) -> dict[int, list[str]]:
+    """Cells of columns of words in some lines, by column."""
+    found: dict[int, list[str]] = {place: [] for place in places}
+    wanted = iter(lines.tolist())
+    line = next(wanted, None)
+    with sheet.path.open(encoding=sheet.encoding, errors="replace", newline="") as file:
+        for end, row in _cells_of(sheet.path, file, sheet.separator, 0):
+            if end == line:
+                for place in places:
+                    found[place].append(row[place] if place < len(row) else "")
+                line = next(wanted, None)
+    return found
 
 
 def _read_sheet(path: Path, wanted: Sequence[str]) -> _Sheet:
@@ -213,12 +273,26 @@ def _names_of_values(lines: Sequence[str]) -> tuple[str, ...]:
     return tuple(_NAMES_OF_VALUES.findall(named[0]))
 
 
-def _without_names(lines: Sequence[str]) -> list[str]:
-    """Lines without the names in front of their values."""
+def _without_names(lines: Sequence[str], *, keep_others: bool = True) -> list[str]:
+    """Lines without the names in front of their values; others stay, or become blank."""
     return [
-        _NAMES_OF_VALUES.sub("", line) if _NAMED_VALUES.fullmatch(line) else line
+        _NAMES_OF_VALUES.sub("", line)
+        if _NAMED_VALUES.fullmatch(line)
+        else line
+        if keep_others
+        else "\n"
         for line in lines
     ]
+
+
+def _count_damaged(lines: Sequence[str]) -> int:
+    """Lines in which something else stands than values behind their names."""
+    return sum(
+        bool(line.strip())
+        and not _is_comment(line)
+        and not _NAMED_VALUES.fullmatch(line)
+        for line in lines
+    )
 
 
 def _telling(lines: list[str]) -> list[str]:
@@ -426,13 +500,15 @@ def _read_body(
     if keep_heads:
         begins = set()
     parts = ColumnParts(sheet.path, titles, _stamped(sheet, titles))
-    number = sheet.first_line
+    number, damaged = sheet.first_line, 0
     with sheet.path.open(encoding=sheet.encoding, errors="replace", newline="") as file:
         for _ in islice(file, number):
             pass
         while lines := list(islice(file, _BLOCK_LINES)):
             if sheet.is_named:
-                lines = _without_names(lines)
+                # With a clock a damaged row is a sample lost.
+                damaged += 0 if keep_heads else _count_damaged(lines)
+                lines = _without_names(lines, keep_others=keep_heads)
             plain = _add_plain(sheet, lines, parts, number)
             number += plain
             lines = lines[plain:]
@@ -451,7 +527,19 @@ def _read_body(
             whole = _without_cut_row(block, sheet.width) if is_cut else block
             parts.add_cells(_without_torn_cells(whole, sheet.width))
             number += source.count
+    _say_damaged(sheet.path, damaged, number - sheet.first_line)
     return parts.columns()
+
+
+def _say_damaged(path: Path, damaged: int, n_rows: int) -> None:
+    """Say how many damaged rows are left out; too many are no slips of a logger."""
+    if damaged > _MOST_DAMAGED * n_rows:
+        raise MeasurementError(
+            f"{path}: {damaged} of {n_rows} rows are damaged; expected values behind "
+            f"their names in all but {_MOST_DAMAGED:.0%} of them; record it again"
+        )
+    if damaged:
+        _log.warning("%s: %d damaged rows are left out", path, damaged)
 
 
 def _is_title(row: Sequence[str], sheet: _Sheet) -> bool:

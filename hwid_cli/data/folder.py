@@ -51,8 +51,8 @@ def list_measurements(folder: Path) -> tuple[FoundFile, ...]:
     Parameters
     ----------
     folder : Path
-        Its own files, or, where there are none, those of all folders below. Hidden
-        files, files of the system and ``plan.csv`` are left out.
+        Its own files, or, where none of them holds a table, those of all folders below.
+        Hidden files, files of the system and ``plan.csv`` are left out.
 
     Returns
     -------
@@ -70,7 +70,10 @@ def list_measurements(folder: Path) -> tuple[FoundFile, ...]:
             f"{folder}: is no folder; expected one that holds measurement files "
             f"({', '.join(SUFFIXES)}); correct the path"
         )
-    paths = _candidates(folder, "*") or _candidates(folder, "**/*")
+    own = [_listed(path, folder) for path in _candidates(folder, "*")]
+    if any(one.columns for one in own):
+        return tuple(own)
+    paths = _candidates(folder, "**/*")
     if not paths:
         raise ConfigError(
             f"{folder}: holds no measurement file; expected some of "

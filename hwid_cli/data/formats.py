@@ -84,7 +84,7 @@ def _of_arrays(
 
 READERS = (
     Reader(
-        (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm"),
+        (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm", ".ascii", ".log", ".prn"),
         read_csv_columns,
         list_csv_columns,
         is_one_table=True,

@@ -27,6 +27,10 @@ _MATLAB_NUMBERS = {
     *(b"uint8", b"uint16", b"uint32", b"uint64"),
 }
 _UNIT_ATTRIBUTES = ("unit", "units")
+# Attributes by which counts become the quantity whose unit stands beside them: those of
+# netCDF, and others that loggers write.
+_SCALE_ATTRIBUTES = ("scale_factor", "scale", "gain", "slope", "lsb")
+_OFFSET_ATTRIBUTES = ("add_offset", "offset", "intercept")
 # Elements of a struct array that are looked at: Simulink has one for each signal.
 _MOST_ELEMENTS = 1000
 
@@ -94,7 +98,22 @@ def _values(dataset: "h5py.Dataset") -> Any:
             f"{dataset.name!r} takes its values from other files, which is not followed"
         )
     check_size(dataset.name, (dataset.size or 0) * dataset.dtype.itemsize)
-    return dataset[()]
+    values = dataset[()]
+    scale = _attribute(dataset, _SCALE_ATTRIBUTES)
+    if scale is None or dataset.dtype.kind not in "iu":
+        return values
+    # In this order by the convention of netCDF.
+    return values * scale + (_attribute(dataset, _OFFSET_ATTRIBUTES) or 0.0)
+
+
+def _attribute(dataset: "h5py.Dataset", names: tuple[str, ...]) -> float | None:
+    """Single number that an attribute of one of these names states."""
+    for attribute, value in dataset.attrs.items():
+        number = np.asarray(value)
+        is_number = number.size == 1 and number.dtype.kind in "fiu"
+        if is_number and attribute.lower() in names:
+            return float(number.item())
+    return None
 
 
 def _from_matlab(dataset: "h5py.Dataset") -> Any:

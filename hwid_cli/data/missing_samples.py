@@ -1,8 +1,9 @@
 """Samples that a file does not have: a blank cell, NaN, a word for no number.
 
-A single one between two others is bridged by a straight line, and said to be. More of
-them are a fault, which the checks refuse, or a slow signal in the rows of a fast one,
-which can be resampled.
+A few between two others are bridged by a straight line, and said to be. More of them
+are a fault, which the checks refuse, or a slow signal in the rows of a fast one, which can
+be resampled. Where a signal was out of range, a line would cut its top off: one sample is
+bridged there, and no more.
 """
 
 import logging
@@ -11,13 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.cells import MISSING_WORDS
+from hwid_cli.data.cells import MISSING_WORDS, OVER_RANGE_WORDS
 from hwid_cli.data.columns import ROLES, FileColumns, MeasuredColumn, place_of
 
 _log = logging.getLogger(__name__)
 
-# Beyond this share a signal is no longer one with a sample lost, [-].
+# Beyond this share a signal is no longer one with a sample lost, [-], and beyond so many
+# in a row the line would be a guess, [samples].
 _MOST_BRIDGED = 0.01
+_LONGEST_BRIDGE = 10
 # Instruments send 9.9E37 for overflow and 9.91E37 for no number (SCPI 1999, 7.2.1).
 _NO_NUMBER, _NO_MORE = 9.9e37, 1e38
 
@@ -39,7 +42,7 @@ def missing(column: MeasuredColumn) -> np.ndarray:
 def bridge_missing(
     path: Path, columns: FileColumns
 ) -> tuple[FileColumns, dict[str, tuple[int, ...]]]:
-    """Bridge single missing samples.
+    """Bridge a few missing samples.
 
     Parameters
     ----------
@@ -49,7 +52,7 @@ def bridge_missing(
     Returns
     -------
     FileColumns
-        Columns that lack more than single samples are left as they are.
+        Columns that lack more are left as they are.
     dict of str to tuple of int, [samples]
         Samples that were bridged, by role.
     """
@@ -60,11 +63,12 @@ def bridge_missing(
         if column is not None and (is_none := _says_none(column.values)).any():
             column = replace(column, values=np.where(is_none, np.nan, column.values))
             changed[role] = column
-        places = np.zeros(0, int) if column is None else _single(missing(column))
-        if places.size == 0:
+        places = np.zeros(0, int) if column is None else _bridged(column)
+        if column is None or places.size == 0:
             continue
         values = column.values.copy()
-        values[places] = 0.5 * values[places - 1] + 0.5 * values[places + 1]
+        known = np.flatnonzero(np.isfinite(values))
+        values[places] = np.interp(places, known, values[known])
         changed[role] = replace(column, values=values)
         bridged[role] = tuple(int(place) for place in places)
         more = f" (and {places.size - 1} more)" if places.size > 1 else ""
@@ -81,11 +85,20 @@ def _says_none(values: np.ndarray) -> np.ndarray:
     return (np.abs(values) >= _NO_NUMBER) & (np.abs(values) < _NO_MORE)
 
 
-def _single(is_lost: np.ndarray) -> np.ndarray:
-    """Places of lost samples, if each stands alone between two that are there."""
+def _bridged(column: MeasuredColumn) -> np.ndarray:
+    """Places of lost samples, if they are few and stand between some that are there."""
+    is_lost = missing(column)
     places = np.flatnonzero(is_lost)
     if places.size == 0 or places.size > max(1.0, _MOST_BRIDGED * is_lost.size):
         return np.zeros(0, int)
+    runs = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
     at_end = places[0] == 0 or places[-1] == is_lost.size - 1
-    together = bool((np.diff(places) == 1).any())
-    return np.zeros(0, int) if at_end or together else places
+    is_long = any(run.size > _longest(column, run) for run in runs)
+    return np.zeros(0, int) if at_end or is_long else places
+
+
+def _longest(column: MeasuredColumn, run: np.ndarray) -> int:
+    """How many samples in a row may be bridged where some are missing."""
+    texts = [column.texts.get(int(column.rows[one]), "") for one in run]
+    is_over = any(text.lower() in OVER_RANGE_WORDS for text in texts)
+    return 1 if is_over else _LONGEST_BRIDGE

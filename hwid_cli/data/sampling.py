@@ -6,12 +6,13 @@ that have clocks of their own, or not a sample in every row.
 """
 
 import logging
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.column_signs import MOST_REPEATED
+from hwid_cli.data.column_signs import MOST_ODD, MOST_REPEATED, growing_rows
 from hwid_cli.data.columns import (
     FileColumns,
     MeasuredColumn,
@@ -41,8 +42,9 @@ _MOST_GROWTH = 2
 _NEXT_TO_IT = 0.05
 # Clocks that differ by less than this share of their step are one, [-].
 _SAME_CLOCK = 0.01
-# Longest stretch without a sample that a straight line may cross, [steps].
-_LONGEST_GAP = 10.0
+# Longest stretch without a sample that a straight line may cross, [steps], or where that
+# is longer this share of a recording, [-].
+_LONGEST_GAP, _LONGEST_PAUSE = 10.0, 0.01
 _SIGNALS = ("input", "output", "reference")
 _FEWEST_SAMPLES = 20
 # Two time stamps make one step; one makes none.
@@ -83,6 +85,8 @@ def sample_uniformly(
     columns = _without_second_clock(columns)
     _check_length(path, columns, time)
     columns, time = _without_repeated_rows(path, columns, time)
+    if options.resample:
+        columns, time = _without_odd_stamps(path, columns, time)
     steps = np.diff(time.values)
     _check_order(path, time, steps)
     median = float(np.median(steps))
@@ -173,28 +177,62 @@ def _without_repeated_rows(
     path: Path, columns: FileColumns, time: MeasuredColumn
 ) -> tuple[FileColumns, MeasuredColumn]:
     """Leave out rows that a logger wrote twice, to the last digit."""
-    given = (time, columns.input, columns.output, columns.reference)
-    known = [one for one in given if one is not None]
-    if columns.output_time is not None or len({one.values.size for one in known}) > 1:
+    known = _of_one_length(columns)
+    if not known:
         return columns, time
     again = np.logical_and.reduce(
         [
             (one.values[1:] == one.values[:-1])
             | (np.isnan(one.values[1:]) & np.isnan(one.values[:-1]))
-            for one in known
+            for one in known.values()
         ]
     )
     # More of them are no slip of a logger, but a clock that is too coarse.
     if not 0.0 < np.mean(again) <= MOST_REPEATED:
         return columns, time
-    keep = np.append(True, ~again)
     _log.warning(
         "%s: %d rows are the row before once more, and left out", path, again.sum()
     )
-    kept = {
-        role: replace(one, values=one.values[keep], rows=one.rows[keep])
+    return _kept_rows(columns, known, np.append(True, ~again))
+
+
+def _without_odd_stamps(
+    path: Path, columns: FileColumns, time: MeasuredColumn
+) -> tuple[FileColumns, MeasuredColumn]:
+    """Leave out a few rows whose time does not go on from the rows around them."""
+    known = _of_one_length(columns)
+    if not known or not np.isfinite(time.values).all():
+        return columns, time
+    fits = growing_rows(time.values)
+    if not 0.0 < np.mean(~fits) <= MOST_ODD:
+        return columns, time
+    _log.warning(
+        "%s: %d rows are left out whose time does not go on (the first: row %d)",
+        path,
+        np.count_nonzero(~fits),
+        int(time.rows[np.argmin(fits)]),
+    )
+    return _kept_rows(columns, known, fits)
+
+
+def _of_one_length(columns: FileColumns) -> dict[str, MeasuredColumn]:
+    """Columns by role where they stand in the same rows; none where they do not."""
+    known = {
+        role: one
         for role in ("time", *_SIGNALS)
         if (one := getattr(columns, role)) is not None
+    }
+    is_one = len({one.values.size for one in known.values()}) == 1
+    return known if is_one and columns.output_time is None else {}
+
+
+def _kept_rows(
+    columns: FileColumns, known: Mapping[str, MeasuredColumn], keep: np.ndarray
+) -> tuple[FileColumns, MeasuredColumn]:
+    """Some of the rows, and the time in them."""
+    kept = {
+        role: replace(one, values=one.values[keep], rows=one.rows[keep])
+        for role, one in known.items()
     }
     return replace(columns, **kept), kept["time"]
 
@@ -375,9 +413,10 @@ def _misfit(time: np.ndarray, ticks: np.ndarray) -> float:
 def _check_gaps(
     path: Path, time: MeasuredColumn, steps: np.ndarray, step: float
 ) -> None:
-    """Refuse to make up most of a recording."""
-    if steps.sum() / step > _MOST_GROWTH * time.values.size:
-        index = int(np.argmax(steps))
+    """Refuse to make up most of a recording, or what happened in a pause."""
+    index = int(np.argmax(steps))
+    most = max(_LONGEST_GAP * step, _LONGEST_PAUSE * float(steps.sum()))
+    if steps.sum() / step > _MOST_GROWTH * time.values.size or steps[index] > most:
         raise MeasurementError(
             f"{place_of(path, time, index + 1)}: time jumps by {steps[index]:.6g} s, "
             f"from {time.values[index]:.9g} s to {time.values[index + 1]:.9g} s; "

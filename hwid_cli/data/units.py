@@ -74,6 +74,8 @@ _UNITLESS_WORDS = ("", "-", "1", "none", "unitless", "dimensionless")
 _RAISED = str.maketrans({"²": "^2", "³": "^3", "⁴": "^4", "⁻": "-", "¹": "1"})
 _SYMBOL = r"[A-Za-z_\u00b5\u03bc°Ωµ]+(?:(?:\^|\*\*)?-?[1-4])?"
 _FORM = re.compile(rf"{_SYMBOL}(?:[ */·.]{_SYMBOL}){{0,5}}")
+# A unit with what it measures behind it, as TwinCAT writes.
+_WITH_QUANTITY = re.compile(r"(\S+) \([A-Z][a-z ]+\)")
 _LONGEST = 40
 _DAY_S = 86_400.0
 # Days since 1900 and since the year 0, and steps of 100 ns since 1601, of 1970 to 2080.
@@ -468,8 +470,15 @@ def looks_like_unit(text: str) -> bool:
 
 
 def bare_unit(text: str) -> str:
-    """Take the brackets off a unit."""
+    """Take the brackets off a unit, and what it measures from behind it.
+
+    Examples
+    --------
+    >>> bare_unit("[mm]"), bare_unit("mm (Length)"), bare_unit("(V)")
+    ('mm', 'mm', 'V')
+    """
     bare = text.strip()
     if len(bare) > 1 and bare[0] in "[(" and bare[-1] in "])":
         bare = bare[1:-1].strip()
-    return bare
+    with_quantity = _WITH_QUANTITY.fullmatch(bare)
+    return with_quantity[1] if with_quantity else bare

@@ -124,7 +124,7 @@ def test_rows_of_words_and_values_are_refused_in_one_line(folder, tmp_path):
         for when, *values in zip(t, u, y, strict=True)
         for tag, value in zip(("current_A", "position_mm"), values, strict=True)
     ]
-    put(folder, "all.csv", ["timestamp,tag,value", *lines])
+    put(folder, "all.csv", ["timestamp,who,what", *lines])
     result = invoke("init", folder, "--out", tmp_path / "mine.yaml")
 
     assert result.exit_code == 1

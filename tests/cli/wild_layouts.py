@@ -633,3 +633,111 @@ def tables_of_r_without_a_name_above_their_rows(folder):
 
     _texts(folder, ['"t" "i_A" "x_mm"'], rows, "txt")
     return _expected()
+
+
+@layout
+def rows_of_time_name_and_value_of_a_database(folder):
+    """Each signal below the other, as an annotated CSV of InfluxDB has them."""
+    begin = dt.datetime(2024, 3, 12, 9, 14, 2)
+    lines = [
+        "#group,false,false,true,true,false,false,true,true",
+        "#datatype,string,long,dateTime:RFC3339,dateTime:RFC3339,dateTime:RFC3339,double,"
+        "string,string",
+        "#default,_result,,,,,,,",
+        ",result,table,_start,_stop,_time,_value,_field,run",
+    ]
+    span = "2024-03-12T09:10:00Z,2024-03-12T09:20:00Z"
+    for place, field in ((1, "i_q_A"), (2, "x_act_mm")):
+        for number, (name, run) in enumerate(zip(NAMES, RUNS, strict=True)):
+            for t, value in zip(run[0], run[place], strict=True):
+                stamp = begin + dt.timedelta(minutes=number, seconds=float(t))
+                time = f"{stamp:%Y-%m-%dT%H:%M:%S.%f}"[:-3] + "Z"
+                lines.append(f",,0,{span},{time},{_number(value)},{field},{name}")
+    _put(folder / "influx.csv", lines)
+    return _expected()
+
+
+@layout
+def rows_of_time_name_and_value_in_german(folder):
+    """Signals in turn, in a file for each recording."""
+    for name, (t, u, y) in zip(NAMES, RUNS, strict=True):
+        lines = ["Zeit [s];Kanal;Wert"]
+        for time, one, other in zip(t, u, y, strict=True):
+            lines += [f"{_comma(time)};Strom [A];{_comma(one)}"]
+            lines += [f"{_comma(time)};Weg [mm];{_comma(other)}"]
+        _put(folder / f"{name}.csv", lines)
+    return _expected()
+
+
+@layout
+def counts_with_scale_and_offset_in_hdf5(folder):
+    import h5py
+
+    written = []
+    with h5py.File(folder / "rig.h5", "w") as file:
+        for name, (_, u, y) in zip(NAMES, RUNS, strict=True):
+            group = file.create_group(f"measurements/{name}/analog_in")
+            group.attrs["sample_rate"] = 500.0
+            read = {}
+            for key, values, unit in (("coil_current", u, "A"), ("position", y, "mm")):
+                scale, offset = np.ptp(values) / 3e4, 0.25
+                counts = np.round((values - offset) / scale).astype(np.int16)
+                data = group.create_dataset(key, data=counts)
+                data.attrs.update({"scale": scale, "offset": offset, "unit": unit})
+                read[unit] = counts * scale + offset
+            written.append(Written(read["A"], 1e-3 * read["mm"], "A", "m"))
+    return written
+
+
+@layout
+def time_series_of_matlab_made_structs(folder):
+    import scipy.io
+
+    def series(name, t, values, unit):
+        info = {"Units": unit, "Interpolation": "zoh"}
+        return {"Name": name, "Data": values, "Time": t, "DataInfo": info}
+
+    runs = {
+        f"logsout_{name}": {
+            "u_cmd": series("u_cmd", t, u, "A"),
+            "theta": series("theta", t, y.reshape(1, 1, -1), "deg"),
+        }
+        for name, (t, u, y) in zip(NAMES, RUNS, strict=True)
+    }
+    scipy.io.savemat(folder / "log.mat", {**runs, "P": {"Ts": STEP_S, "Kp": 2.0}})
+    return _expected("A", "rad", scale=np.pi / 180)
+
+
+@layout
+def a_serial_console_with_garbage(folder):
+    """Lines of a controller, some of them damaged in between."""
+    for number, (name, (t, u, y)) in enumerate(zip(NAMES, RUNS, strict=True)):
+        lines = ["=~=~=~=~=~= PuTTY log 2024.03.12 16:00:11 =~=~=~=~=~=", "servo v0.4"]
+        for k in range(N):
+            lines.append(
+                f"t_ms:{1000 * t[k]:.0f},i_A:{float(u[k])!r},x_mm:{float(y[k])!r}"
+            )
+            if k in (40 + number, 200):
+                lines.append("t_ms:3i_A:1.0,x_\x01\x1f")
+        _put(folder / f"{name}.log", lines)
+    return _expected()
+
+
+@layout
+def notes_beside_folders_of_recordings(folder):
+    (folder / "notes.txt").write_text("CH1 is the coil, CH2 the laser\nOperator: HK\n")
+    for name, run in zip(NAMES, RUNS, strict=True):
+        (folder / name).mkdir()
+        rows = [",".join(map(_number, row)) for row in zip(*run, strict=True)]
+        _put(folder / name / f"{name}.csv", ["t_s,i_A,x_mm", *rows])
+    return _expected()
+
+
+@layout
+def units_with_what_they_measure_behind(folder):
+    """As TwinCAT's Scope has them above the numbers."""
+    for name, (t, u, y) in zip(NAMES, RUNS, strict=True):
+        rows = ["\t".join(map(_comma, row)) for row in zip(1000 * t, u, y, strict=True)]
+        head = ["Name\tIqAct\tActPos", "Unit\tA (Current)\tmm (Length)"]
+        _put(folder / f"{name}.csv", [*head, "SampleTime[ms]\t2\t2", *rows])
+    return _expected()

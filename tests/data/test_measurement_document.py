@@ -42,7 +42,11 @@ def sheets(path):
 
 
 FAULTS = {
-    "two gaps": ("run.csv", text((9, "0,07;;1,5"), (10, "0,08;;1,5")), COLUMNS),
+    "two gaps": (
+        "run.csv",
+        text(*((n, f"0,{n - 2:02d};;1,5") for n in range(9, 21))),
+        COLUMNS,
+    ),
     "word": ("run.csv", text((9, "0,07;off;1,5")), COLUMNS),
     "other mark": ("run.csv", text((9, "0,07;1;1.5")), COLUMNS),
     "two ways": (

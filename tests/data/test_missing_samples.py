@@ -35,11 +35,11 @@ def test_single_samples_are_bridged_and_said(caplog):
 
 @pytest.mark.parametrize(
     "lost",
-    [(7, 8), (0,), (399,), tuple(range(10, 300, 50))],
-    ids=["two together", "the first", "the last", "more than 1 %"],
+    [tuple(range(7, 18)), (0,), (1999,), tuple(range(10, 1900, 50))],
+    ids=["eleven together", "the first", "the last", "more than 1 %"],
 )
-def test_more_than_single_samples_are_left_as_they_are(lost):
-    found, places = bridge_missing("run.csv", columns(line(400, *lost)))
+def test_more_than_a_few_samples_are_left_as_they_are(lost):
+    found, places = bridge_missing("run.csv", columns(line(2000, *lost)))
 
     assert places == {}
     assert np.isnan(found.output.values).sum() == len(lost)
@@ -61,3 +61,19 @@ def test_a_file_says_where_samples_are_missing(tmp_path):
 
     assert places == {"input": (20,)}
     assert bridged.input.values[20] == 20.0
+
+
+def test_ten_in_a_row_are_bridged_by_one_line():
+    found, places = bridge_missing("run.csv", columns(line(2000, *range(7, 17))))
+
+    assert places == {"output": tuple(range(7, 17))}
+    np.testing.assert_allclose(found.output.values, np.arange(2000.0))
+
+
+def test_only_one_sample_out_of_range_is_bridged():
+    """A line over several would cut the top of a motion off."""
+    one = columns(line(2000, 7), {7: "OVERFLOW"})
+    two = columns(line(2000, 7, 8), {7: "", 8: "-∞"})
+
+    assert bridge_missing("run.csv", one)[1] == {"output": (7,)}
+    assert bridge_missing("run.csv", two)[1] == {}

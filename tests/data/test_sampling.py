@@ -255,6 +255,32 @@ def test_a_time_that_comes_twice_with_other_numbers_is_refused():
         sample_uniformly(PATH, given_columns, options())
 
 
+def test_rows_whose_time_does_not_fit_are_left_out_where_resampling_may_fill_them(
+    caplog,
+):
+    """A repeated stamp, one damaged upwards, one downwards."""
+    time = 0.001 * np.arange(400)
+    odd = time.copy()
+    odd[[50, 120, 300]] = [odd[49], 9.0, 0.002]
+    given_columns = columns(odd)
+    given_columns.output.values[[50, 120, 300]] = 1e6
+    found, step = sample_uniformly(PATH, given_columns, options(resample=True))
+    assert step == pytest.approx(0.001)
+    np.testing.assert_allclose(found.input.values, 2 * time, atol=1e-12)
+    assert np.abs(found.output.values).max() < 1.0
+    assert "3 rows are left out whose time does not go on" in caplog.text
+
+
+def test_resampling_draws_no_line_over_a_pause():
+    """Nobody knows what the input did in 60 samples."""
+    time = 0.01 * np.delete(np.arange(1600), np.arange(700, 760))
+    with pytest.raises(MeasurementError, match=r"time jumps by 0.61 s.*cut the file"):
+        sample_uniformly(PATH, columns(time), options(resample=True))
+    short = 0.01 * np.delete(np.arange(1600), np.arange(700, 709))
+    found, _ = sample_uniformly(PATH, columns(short), options(resample=True))
+    assert found.input.values.size == 1600
+
+
 # The first stamp is as far off as any other: it tells nothing of the others' scatter.
 @pytest.mark.parametrize(
     ("jitter", "first", "share"),
