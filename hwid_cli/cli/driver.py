@@ -19,6 +19,7 @@ from hwid_cli.cli.session import (
 )
 from hwid_cli.cli.stage_runner import StageRunner
 from hwid_cli.config.load import describe_experiment
+from hwid_cli.data.recording_files import recordings_options
 from hwid_cli.data.recordings import check_unchanged
 from hwid_cli.errors import CacheError, HwidError
 from hwid_cli.report.table import WIDTH, Block, as_text
@@ -194,7 +195,10 @@ def _origin(session: Session, given: Any, key: str, seconds: float) -> Provenanc
     """Where results come from, said right before they are stored."""
     measured = session.given.get("calibrate")
     if measured is not None:
-        check_unchanged({one.source: one.sha256 for one in measured.recordings})
+        check_unchanged(
+            {one.source: one.sha256 for one in measured.recordings},
+            recordings_options(session.experiment).columns,
+        )
     return Provenance(
         key,
         describe_experiment(session.experiment),

@@ -85,6 +85,9 @@ def _columns(experiment: Experiment) -> Iterator[Fault]:
         column = getattr(options.columns, name)
         if column is None:
             continue
+        is_of_output = name in ("output", "output_time")
+        if is_of_output and options.columns.output_file is not None:
+            continue
         if column in taken:
             yield Fault(
                 ("recordings", "columns", name),
@@ -92,6 +95,21 @@ def _columns(experiment: Experiment) -> Iterator[Fault]:
                 "another column",
             )
         taken[column] = name
+
+
+def _output_file(experiment: Experiment) -> Iterator[Fault]:
+    options = experiment.recordings
+    change = None if options is None else options.columns.output_file
+    if change is None:
+        return
+    if len(change) != 2 or change[0] == change[1]:
+        yield Fault(
+            ("recordings", "columns", "output_file"),
+            f"found {list(change)!r}",
+            "two different texts: what the name of the input's file has, and that of the "
+            "output's file in its place",
+            "write [CH1, CH2] or the like",
+        )
 
 
 def _clock(experiment: Experiment) -> Iterator[Fault]:
@@ -359,6 +377,7 @@ _GRID = "orders fit.delays fit.largest_pole_radius"
 _AGREEMENTS = (
     _Agreement(_name, "name"),
     _Agreement(_columns, "recordings.columns"),
+    _Agreement(_output_file, "recordings.columns.output_file"),
     _Agreement(_clock, "recordings.columns.time recordings.sample_time_s"),
     _Agreement(
         _units,

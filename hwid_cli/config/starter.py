@@ -257,8 +257,8 @@ def _si_unit(role: Role) -> str:
     return QUANTITIES[quantity_of(role.unit)] if is_converted else role.unit
 
 
-def _columns(layout: FolderLayout) -> dict[str, str | int]:
-    columns: dict[str, str | int] = {}
+def _columns(layout: FolderLayout) -> dict[str, str | int | list[str]]:
+    columns: dict[str, str | int | list[str]] = {}
     if layout.variable is not None:
         columns["variable"] = layout.variable
     if layout.time is not None:
@@ -266,6 +266,8 @@ def _columns(layout: FolderLayout) -> dict[str, str | int]:
     columns |= {"input": layout.input.key, "output": layout.output.key}
     if layout.output_time is not None:
         columns["output_time"] = layout.output_time.key
+    if layout.output_file is not None:
+        columns["output_file"] = list(layout.output_file)
     return columns
 
 

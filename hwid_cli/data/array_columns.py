@@ -8,7 +8,7 @@ Its unit is said by an attribute (HDF5), by text of a name like ``current_unit``
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,9 +37,9 @@ _VALUES = ("value", "values", "data", "Value", "Values", "Data")
 
 
 def pick_columns(
-    path: Path, columns: Columns, variables: Variables
+    path: Path, columns: Columns, variables: Variables, roles: Sequence[str] = ROLES
 ) -> Iterator[tuple[str, MeasuredColumn]]:
-    """Give the columns that are wanted, each with its role.
+    """Give the columns of some roles.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def pick_columns(
     table = None
     if columns.variable is not None and not _is_group(columns.variable, variables):
         table = _variable(path, columns.variable, variables, "variable")
-    for role in ROLES:
+    for role in roles:
         key = getattr(columns, role)
         if key is None:
             continue

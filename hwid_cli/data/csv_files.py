@@ -111,8 +111,10 @@ _forms: dict[tuple[tuple[str, ...], tuple[str, ...]], _Sheet] = {}
 _MOST_FORMS = 64
 
 
-def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredColumn]]:
-    """Read the columns that are wanted from a text file.
+def read_csv_columns(
+    path: Path, columns: Columns, roles: Sequence[str] = ROLES
+) -> list[tuple[str, MeasuredColumn]]:
+    """Read the columns of some roles from a text file.
 
     Parameters
     ----------
@@ -130,12 +132,12 @@ def read_csv_columns(path: Path, columns: Columns) -> list[tuple[str, MeasuredCo
         If the file holds no rows, a column is missing, or a row has too many cells.
     """
     wanted = {
-        role: key for role in ROLES if (key := getattr(columns, role)) is not None
+        role: key for role in roles if (key := getattr(columns, role)) is not None
     }
     sheet = _read_sheet(path, [key for key in wanted.values() if isinstance(key, str)])
     tables = _long_tables(sheet, wanted)
     if tables:
-        return pick_from_long(str(path), columns, tables)
+        return pick_from_long(str(path), columns, tables, roles)
     stamps = split_stamps(sheet.head.names)
     split = {role: stamps[key] for role, key in wanted.items() if key in stamps}
     places = {

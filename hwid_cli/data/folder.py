@@ -31,6 +31,7 @@ from hwid_cli.data.formats import SUFFIXES, list_columns, reader_of
 from hwid_cli.data.header_stamps import topic_of
 from hwid_cli.data.recording_files import PLAN_NAME
 from hwid_cli.data.sampling import missing_samples
+from hwid_cli.data.split_files import split_recordings
 from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files.messages import escaped
 from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
@@ -194,8 +195,26 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
     """
     files = [_with_starred_tables(one) for one in files]
     alike = _alike(files)
+    if not any(_holds_signals(_table(one)) for one in alike):
+        for split in split_recordings(files):
+            layout = _layout_of_alike(split.files, split.files)
+            if not split.is_marked(layout.input):
+                return split.with_own_keys(layout)
     if not alike:
         raise MeasurementError(_no_signals(files))
+    return _layout_of_alike(alike, files)
+
+
+def _layout_of_alike(
+    alike: Sequence[FoundFile], files: Sequence[FoundFile]
+) -> FolderLayout:
+    """How files with the same columns are read.
+
+    Raises
+    ------
+    MeasurementError
+        If none of them shows an input and an output.
+    """
     typical, signals = _typical(alike)
     long_ones = _table(typical)
     scalars = [one for one in typical.columns if one.values.size == 1]
@@ -422,7 +441,7 @@ def _layout(
 
 
 def _alike(files: Sequence[FoundFile]) -> list[FoundFile]:
-    """The largest set of files with the same columns."""
+    """The largest set of files with the same columns, of those that hold signals."""
     sets: dict[tuple[object, ...], list[FoundFile]] = {}
     for one in files:
         table = _table(one) if one.columns else []
@@ -431,7 +450,14 @@ def _alike(files: Sequence[FoundFile]) -> list[FoundFile]:
             places = (ending, *(column.place for column in table))
             sets.setdefault(places, []).append(one)
     # The first of the largest ones: names in order make the choice repeatable.
-    return max(sets.values(), key=len, default=[])
+    return max(
+        sets.values(),
+        key=lambda alike: (
+            any(_holds_signals(_table(one)) for one in alike),
+            len(alike),
+        ),
+        default=[],
+    )
 
 
 def _why_not(

@@ -5,9 +5,9 @@ docs/architecture.md, "Where to touch what".
 """
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ import numpy as np
 
 from hwid_cli.data.array_columns import Variables, list_variables, pick_columns
 from hwid_cli.data.arrow_files import open_arrow
-from hwid_cli.data.columns import FileColumns, MeasuredColumn
+from hwid_cli.data.columns import ROLES, FileColumns, MeasuredColumn
 from hwid_cli.data.csv_files import list_csv_columns, read_csv_columns
 from hwid_cli.data.hdf5_files import open_hdf5
 from hwid_cli.data.mat_files import open_mat
@@ -45,7 +45,7 @@ class Reader:
     suffixes : tuple of str
         Endings of such files, in lower case.
     read : callable
-        Gives the columns that are wanted one by one, each with its role.
+        Gives the columns of some roles one by one.
     list_columns : callable
         Gives all columns of numbers, for ``hwid init``.
     needs : str
@@ -57,7 +57,7 @@ class Reader:
     """
 
     suffixes: tuple[str, ...]
-    read: Callable[[Path, Columns], Iterable[tuple[str, MeasuredColumn]]]
+    read: Callable[[Path, Columns, Sequence[str]], Iterable[tuple[str, MeasuredColumn]]]
     list_columns: Callable[[Path], Iterable[FoundColumn]]
     needs: str = ""
     is_isolated: bool = False
@@ -71,9 +71,11 @@ def _of_arrays(
 ) -> Reader:
     """Reader of files that hold arrays with names."""
 
-    def read(path: Path, columns: Columns) -> Iterator[tuple[str, MeasuredColumn]]:
+    def read(
+        path: Path, columns: Columns, roles: Sequence[str]
+    ) -> Iterator[tuple[str, MeasuredColumn]]:
         with opened(path) as variables:
-            yield from pick_columns(path, columns, variables)
+            yield from pick_columns(path, columns, variables, roles)
 
     def list_columns(path: Path) -> Iterator[FoundColumn]:
         with opened(path) as variables:
@@ -131,18 +133,73 @@ def reader_of(path: Path) -> Reader:
 
 
 def read_columns(path: Path, columns: Columns) -> FileColumns:
-    """Read the columns of a measurement file by its ending.
+    """Read the columns of a recording by the ending of its file.
 
     Parameters
     ----------
     columns : Columns
-        Where they are in the file.
+        Where they are in the file, and in which file the output is.
 
     Raises
     ------
     MeasurementError
-        If the format is unknown, or the file is empty, damaged or lacks a column.
+        If the format is unknown, or a file is missing, empty, damaged or lacks a column.
     """
+    if columns.output_file is None:
+        return FileColumns(**_read_roles(path, columns, ROLES))
+    own = _read_roles(path, columns, ("input", "time", "reference"))
+    clock = columns.output_time if columns.output_time is not None else columns.time
+    of_output = replace(columns, time=clock)
+    other = _read_roles(
+        output_file_of(path, columns.output_file), of_output, ("output", "time")
+    )
+    if "time" in other:
+        other["output_time"] = other.pop("time")
+    return FileColumns(**own, **other)
+
+
+def output_file_of(path: Path, change: tuple[str, ...]) -> Path:
+    """File that the output stands in, beside that of the input.
+
+    Parameters
+    ----------
+    change : tuple of two str
+        What the path of the input's file has, at last, and that of the output's file in
+        its place.
+
+    Raises
+    ------
+    MeasurementError
+        If the path has nothing of it, or there is no such file.
+
+    Examples
+    --------
+    >>> output_file_of(Path("/none/run_1_current.csv"), ("speed", "current"))
+    Traceback (most recent call last):
+    hwid_cli.errors.MeasurementError: /none/run_1_current.csv: has no 'speed' in its ...
+    """
+    here, there = change
+    before, found, after = str(path).rpartition(here)
+    if not found:
+        raise MeasurementError(
+            f"{path}: has no {here!r} in its name; expected it in that of every input's "
+            f"file, with {there!r} in its place in that of the output's; correct "
+            "recordings.files or recordings.columns.output_file"
+        )
+    other = Path(f"{before}{there}{after}")
+    if not other.is_file():
+        raise MeasurementError(
+            f"{path}: the file of its output, {other}, is not there; expected one for "
+            "each file of an input; put it there, or leave this one out with "
+            "recordings.exclude"
+        )
+    return other
+
+
+def _read_roles(
+    path: Path, columns: Columns, roles: Sequence[str]
+) -> dict[str, MeasuredColumn]:
+    """Read the columns of some roles by the ending of a file."""
     reader = reader_of(path)
     try:
         if path.stat().st_size == 0:
@@ -152,9 +209,9 @@ def read_columns(path: Path, columns: Columns) -> FileColumns:
             )
         with _importing(reader, path):
             if not reader.is_isolated:
-                return FileColumns(**dict(reader.read(path, columns)))
-            replies = _asked(reader, path, columns)
-        return FileColumns(**_with_rows(replies))
+                return dict(reader.read(path, columns, roles))
+            replies = _asked(reader, path, columns, roles)
+        return _with_rows(replies)
     except MeasurementError:
         raise
     # The readers of foreign formats raise whatever their parser stumbles on.
@@ -246,17 +303,29 @@ def _importing(reader: Reader, path: Path) -> Iterator[None]:
 
 
 def _asked(
-    reader: Reader, path: Path, columns: Columns | None = None
+    reader: Reader,
+    path: Path,
+    columns: Columns | None = None,
+    roles: Sequence[str] = ROLES,
 ) -> list[Labelled]:
     """Have the process of its own read, which may have to load a library first."""
     seconds = _MOST_SECONDS_TO_LOAD if reader.needs else 0.0
-    return _ISOLATED.ask(_request(path, columns), most_seconds=MOST_SECONDS + seconds)
+    return _ISOLATED.ask(
+        _request(path, columns, roles), most_seconds=MOST_SECONDS + seconds
+    )
 
 
-def _request(path: Path, columns: Columns | None = None) -> dict[str, Any]:
+def _request(
+    path: Path, columns: Columns | None, roles: Sequence[str]
+) -> dict[str, Any]:
     folder = "" if path.is_absolute() else os.getcwd()  # noqa: PTH109
     wanted = None if columns is None else asdict(columns)
-    return {"folder": folder, "path": str(path), "columns": wanted}
+    return {
+        "folder": folder,
+        "path": str(path),
+        "columns": wanted,
+        "roles": list(roles),
+    }
 
 
 def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
@@ -269,7 +338,8 @@ def _answer(request: dict[str, Any]) -> Iterator[Labelled]:
         for one in reader.list_columns(path):
             yield [one.title, one.key, one.variable, one.unit, one.scale], one.values
     else:
-        for role, column in reader.read(path, Columns(**request["columns"])):
+        wanted = Columns(**request["columns"])
+        for role, column in reader.read(path, wanted, request["roles"]):
             about = {name: getattr(column, name) for name in (*_TOLD, "texts")}
             yield [role, about], column.values
             yield [], column.rows

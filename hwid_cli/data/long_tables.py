@@ -195,9 +195,12 @@ def columns_of_long(tables: Sequence[LongTable]) -> tuple[FoundColumn, ...]:
 
 
 def pick_from_long(
-    place: str, columns: Columns, tables: Sequence[LongTable]
+    place: str,
+    columns: Columns,
+    tables: Sequence[LongTable],
+    roles: Sequence[str] = ROLES,
 ) -> list[tuple[str, MeasuredColumn]]:
-    """Columns that are wanted, with their roles.
+    """Columns of some roles.
 
     Parameters
     ----------
@@ -222,7 +225,7 @@ def pick_from_long(
         )
     found = []
     there = table.columns
-    for role in ROLES:
+    for role in roles:
         key = getattr(columns, role)
         if key is None:
             continue

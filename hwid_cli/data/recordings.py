@@ -18,7 +18,7 @@ from hwid_cli.data.columns import (
     block_means,
     with_each,
 )
-from hwid_cli.data.formats import read_columns, tables_of
+from hwid_cli.data.formats import output_file_of, read_columns, tables_of
 from hwid_cli.data.missing_samples import bridge_missing
 from hwid_cli.data.recording_files import (
     FilePart,
@@ -84,9 +84,9 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     plans = {folder: read_plan(folder) for folder in {path.parent for path in paths}}
     recordings = []
     for path in paths:
-        digest = file_sha256(path)
+        digest = recording_sha256(path, options.columns)
         columns = _read_tables(path, by_path[path], options)
-        if file_sha256(path) != digest:
+        if recording_sha256(path, options.columns) != digest:
             raise MeasurementError(
                 f"{path}: changed while it was read; expected a finished recording; "
                 "run again when it is written"
@@ -197,13 +197,15 @@ def _in_means(places: tuple[int, ...], options: RecordingsOptions) -> tuple[int,
     return tuple(sorted({place // options.average for place in places}))
 
 
-def check_unchanged(digests: Mapping[str, str]) -> None:
+def check_unchanged(digests: Mapping[str, str], columns: Columns) -> None:
     """Refuse recordings that are no longer what was read.
 
     Parameters
     ----------
     digests : mapping of str to str
         SHA-256 by file.
+    columns : Columns
+        With the file that the output is in.
 
     Raises
     ------
@@ -211,12 +213,27 @@ def check_unchanged(digests: Mapping[str, str]) -> None:
         If a file has changed or is gone.
     """
     for name, digest in digests.items():
-        if file_sha256(Path(name)) != digest:
+        if recording_sha256(Path(name), columns) != digest:
             raise MeasurementError(
                 f"{name}: changed while this run used it; expected the recording as it "
                 "was read at the start; results of this stage are not stored; run again "
                 "(what was computed is kept for the earlier recording)"
             )
+
+
+def recording_sha256(path: Path, columns: Columns) -> str:
+    """Hash of a recording: that of its file, or of the files of its input and output.
+
+    Raises
+    ------
+    MeasurementError
+        If a file cannot be read.
+    """
+    digest = file_sha256(path)
+    if columns.output_file is None:
+        return digest
+    other = file_sha256(output_file_of(path, columns.output_file))
+    return hashlib.sha256((digest + other).encode()).hexdigest()
 
 
 def file_sha256(path: Path) -> str:
@@ -314,7 +331,8 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
             with _noting(problems, short):
                 table = columns[part.table]
                 raw = _read_part(part, table, plan, experiment)
-                read.append(replace(raw, sha256=file_sha256(path)))
+                digest = recording_sha256(path, options.columns)
+                read.append(replace(raw, sha256=digest))
                 if (time := cut_part(table, part).time) is not None:
                     stamps = time.values[np.isfinite(time.values)]
                     missing[part.name] = missing_samples(stamps)

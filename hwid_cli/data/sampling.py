@@ -98,6 +98,25 @@ def sample_uniformly(
         return columns, options.sample_time_s or _simplest_step(
             time.values, np.arange(time.values.size)
         )
+    return _on_even_grid(path, columns, time, jumps, options)
+
+
+def _on_even_grid(
+    path: Path,
+    columns: FileColumns,
+    time: MeasuredColumn,
+    jumps: np.ndarray,
+    options: RecordingsOptions,
+) -> tuple[FileColumns, float]:
+    """Resample where steps jump, if the configuration allows it.
+
+    Parameters
+    ----------
+    jumps : ndarray of bool, shape (n_stamps - 1,)
+        Steps beyond the tolerance.
+    """
+    steps = np.diff(time.values)
+    median = float(np.median(steps))
     if not options.resample:
         index = int(np.argmax(jumps))
         raise MeasurementError(

@@ -35,9 +35,9 @@ _MOST_CELLS = 30_000_000
 
 
 def read_sheet_columns(
-    path: Path, columns: Columns
+    path: Path, columns: Columns, roles: Sequence[str] = ROLES
 ) -> Iterator[tuple[str, MeasuredColumn]]:
-    """Read the columns that are wanted from a spreadsheet.
+    """Read the columns of some roles from a spreadsheet.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def read_sheet_columns(
         If a sheet or column is missing, or a row has a number in two ways of writing.
     """
     wanted = {
-        role: key for role in ROLES if (key := getattr(columns, role)) is not None
+        role: key for role in roles if (key := getattr(columns, role)) is not None
     }
     texts = [key for key in wanted.values() if isinstance(key, str)]
     name, rows = _sheet_of(path, columns.variable)

@@ -10,6 +10,7 @@ import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from itertools import pairwise
 
 from hwid_cli.data.cells import MISSING_WORDS, is_grouped, is_stamp, plain_number
 from hwid_cli.data.column_words import counts_recordings
@@ -29,6 +30,11 @@ _UNIT_WORDS = frozenset(
         *("yunit", "vunit"),
     ]
 )
+# Words beside a table of a time and a signal that say the unit of one of the two.
+_BESIDE = {
+    **dict.fromkeys(("horizontalunits", "horizontalunit", "hunit"), 0),
+    **dict.fromkeys(("verticalunits", "verticalunit", "vunit", "yunit"), 1),
+}
 # Words in front of rows that say something else about each column.
 _OTHER_WORDS = frozenset(
     [
@@ -232,6 +238,8 @@ def read_head(
             names = ["", *names]
     if names and not units and not any(split_unit(one)[1] for one in names):
         units = _units_above(rows[:name_row], numeric)
+    if not names and not units:
+        units = _units_beside(rows, numeric)
     said = _said_of(rows[:body], names)
     for place, text in said.items():
         if place in numeric and (unit := split_unit(text)[1]):
@@ -247,6 +255,22 @@ def read_head(
         scales=_scales(rows[:body], numeric),
         said=said,
     )
+
+
+def _units_beside(
+    rows: Sequence[Sequence[str]], numeric: Sequence[int]
+) -> dict[int, str]:
+    """Units of a time and a signal that stand in words beside them, as Tektronix writes."""
+    if len(numeric) != 2:
+        return {}
+    found: dict[int, str] = {}
+    for row in rows[:_MOST_ROWS_BESIDE]:
+        beside = row[: numeric[0]]
+        for title, unit in pairwise(beside):
+            place = _BESIDE.get(_letters(title))
+            if place is not None and looks_like_unit(unit):
+                found[numeric[place]] = bare_unit(unit)
+    return found
 
 
 def _said_of(rows: Sequence[Sequence[str]], names: Sequence[str]) -> dict[int, str]:

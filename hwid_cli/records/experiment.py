@@ -64,6 +64,12 @@ class Columns:
 
     CSV: header names (or 0-based numbers). MAT, NPZ, H5: names of variables, or
     ``variable`` with 0-based column numbers.
+
+    Parameters
+    ----------
+    output_file : tuple of two str or None
+        Where the output stands in a file of its own: what the path of the input's file
+        has, and that of the output's file in its place.
     """
 
     input: Annotated[str | int, _COLUMN]
@@ -73,6 +79,9 @@ class Columns:
     simulated: Annotated[str | int | None, _COLUMN] = None
     variable: str | None = None
     output_time: Annotated[str | int | None, _COLUMN] = None
+    output_file: Annotated[
+        tuple[str, ...] | None, Filled("two texts, such as [CH1, CH2]")
+    ] = None
 
 
 @dataclass(frozen=True)

@@ -97,6 +97,9 @@ class FolderLayout:
         Rows at the beginning of the files in which a signal has no number.
     parts : dict of str to tuple of int, [samples]
         First and end of each recording where a file holds several; empty for one.
+    output_file : tuple of two str or None
+        Where the output is in a file of its own: what the name of the input's file has,
+        and that of the output's file in its place.
     """
 
     patterns: tuple[str, ...]
@@ -113,6 +116,7 @@ class FolderLayout:
     left: tuple[tuple[str, str], ...] = ()
     first_sample: int = 0
     parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    output_file: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)

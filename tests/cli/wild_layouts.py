@@ -741,3 +741,35 @@ def units_with_what_they_measure_behind(folder):
         head = ["Name\tIqAct\tActPos", "Unit\tA (Current)\tmm (Length)"]
         _put(folder / f"{name}.csv", [*head, "SampleTime[ms]\t2\t2", *rows])
     return _expected()
+
+
+@layout
+def a_file_for_each_channel_in_folders(folder):
+    """As older oscilloscopes write them: settings beside the numbers, no names."""
+    for number, (t, u, y) in enumerate(RUNS):
+        place = folder / f"ALL{number:04d}"
+        place.mkdir()
+        for channel, values, unit in (("CH1", u, "V"), ("CH2", y, "mm")):
+            rows = [f",,,{_number(one)},{_number(other)}," for one, other in
+                    zip(t - 0.1, values, strict=True)]  # fmt: skip
+            rows[1] = f"Sample Interval,{STEP_S}" + rows[1][1:]
+            rows[4] = f"Vertical Units,{unit}" + rows[4][1:]
+            _put(place / f"F{number:04d}{channel}.CSV", rows)
+    return _expected("V", "m")
+
+
+@layout
+def signals_in_files_of_their_own(folder):
+    """The output begins later, and has a clock of its own."""
+    written = []
+    for number, (t, u, y) in enumerate(RUNS):
+        first = 7 + number
+        for name, unit, begin, values in (
+            ("current", "A", 0, u), ("position", "mm", first, y)
+        ):  # fmt: skip
+            rows = [f"{one:.3f};{_comma(other)}" for one, other in
+                    zip(t[begin:], values[begin:], strict=True)]  # fmt: skip
+            head = f"t [s];{name} [{unit}]"
+            _put(folder / f"test{number}_{name}.csv", [head, *rows])
+        written.append(Written(u[first:], 1e-3 * y[first:], "A", "m"))
+    return written

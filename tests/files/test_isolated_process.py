@@ -257,7 +257,7 @@ def test_the_process_ends_with_the_program(good, endless, number, is_busy):
 
 
 def test_a_missing_library_is_named(tmp_path, monkeypatch):
-    def read(path, columns):
+    def read(path, columns, roles=()):
         import a_library_that_nobody_has
 
         return a_library_that_nobody_has.read(path, columns)
