@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hwid_cli.diagnosis.growing import is_rugged
 from hwid_cli.diagnosis.parameters import is_factor
 from hwid_cli.diagnosis.selection import (
     CLOSE_TO_NOISE,
@@ -273,6 +274,7 @@ def needs_each(
     if len(whole.effects) == 1:
         return True
     is_far = criteria.is_far(whole)
+    is_incomplete = not criteria.leaves_noise(whole)
     for effect in whole.effects:
         left = tuple(one for one in whole.effects if one != effect)
         if left not in fits:
@@ -287,13 +289,20 @@ def needs_each(
         is_clear = against.gain >= LEAST_GAIN and against.improved >= LEAST_IMPROVED
         brings = criteria.excess(fits[left]) - criteria.excess(whole)
         is_last = completes and not _changes_freely(whole, effect)
-        least = LEAST_CONTRIBUTION_FAR if is_far else LEAST_CONTRIBUTION
+        # Whatever shifts impacts a little takes some of a small rest beside them.
+        is_shift = is_incomplete and _is_small_beside_impacts(criteria, fits[left])
+        least = LEAST_CONTRIBUTION_FAR if is_far or is_shift else LEAST_CONTRIBUTION
         least = LEAST_LAST_CONTRIBUTION if is_last else least
         is_clear = is_clear and brings >= least * criteria.excess(base)
         is_clear = is_clear and criteria.is_beyond_stand_in(whole, fits[left])
         if not (is_clear and explains):
             return False
     return True
+
+
+def _is_small_beside_impacts(criteria: SelectionCriteria, part: CandidateFit) -> bool:
+    """Whether a set in which impacts follow from earlier ones leaves little."""
+    return is_rugged(part.effects) and criteria.ratio(part) <= STILL_LARGE
 
 
 def _nearly_completes(

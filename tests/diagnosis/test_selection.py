@@ -624,6 +624,23 @@ def test_a_small_effect_is_needed_that_takes_much_down_to_nearly_noise(
     assert verdict.chosen is (both if is_both else one)
 
 
+@pytest.mark.parametrize(
+    ("first", "with_both", "whiteness", "is_both"),
+    [
+        # From 2.2 to 1.3 times the noise, 3 % of all: enough beside a limit, not beside
+        # teeth, where whatever shifts impacts takes that, unless nothing is left.
+        ("input_saturation", 174.0, 2.0, True),
+        ("gear_backlash", 174.0, 2.0, False),
+        ("gear_backlash", 100.0, 0.5, True),
+    ],
+)
+def test_beside_teeth_a_small_rest_needs_more(first, with_both, whiteness, is_both):
+    one = made_up((first,), 490.0, whiteness=9.0)
+    both = made_up((first, "periodic_force"), with_both, whiteness=whiteness)
+    verdict = decided(base(9_370.0), [one, both], [one, both], given=9_370.0)
+    assert verdict.chosen is (both if is_both else one)
+
+
 OTHERS = ("cogging", "gravity", "sensor_lag", "quadratic_drag", "spring_gap")
 
 
