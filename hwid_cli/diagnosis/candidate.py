@@ -525,7 +525,7 @@ def start_values(
     found: CandidateFit, present: dict[str, dict[str, float]]
 ) -> dict[str, dict[str, float]]:
     """The same as a start, with what the simulation has and the fit has lost."""
-    return {**present_start(found, present), **fitted_effects(found)}
+    return {**fitted_effects(found), **present_start(found, present)}
 
 
 def start_from(drive: Drive, found: CandidateFit) -> SearchStart:

@@ -91,3 +91,36 @@ def test_a_period_that_the_simulation_states_is_not_lost_while_the_base_is_off()
     assert at_once.whiteness > 100
     assert found.whiteness <= 1.0
     assert found.values[column] == pytest.approx(4e-3, rel=1e-4)
+
+
+@pytest.mark.thorough
+def test_friction_that_a_fit_has_lost_comes_back_by_way_of_pieces():
+    """On a hardening spring a fit of all at once jumps beside the resonance."""
+    drive = replace(
+        DRIVE,
+        mass_kg=0.35,
+        damping_N_s_per_m=4.5,
+        stiffness_N_per_m=2600.0,
+        force_constant_N_per_A=9.5,
+    )
+    friction = {"coulomb_friction": {"force_N": 0.35}}
+    spring = {"cubic_stiffness": {"stiffness_N_per_m3": 2.2e7}}
+    given = problem(
+        recordings({**friction, **spring}, drive=drive, noise=2e-6),
+        mass_kg=0.365,
+        damping_N_s_per_m=4.9,
+        stiffness_N_per_m=2500.0,
+        force_constant_N_per_A=9.2,
+        effects={
+            "coulomb_friction": {"force_N": 0.33},
+            "cubic_stiffness": {"stiffness_N_per_m3": 2.05e7},
+        },
+    )
+    at_once = fit(given)
+    found = base_fit.fitted_base(given).base
+    column = [one.parameter for one in found.names].index("force_N")
+
+    assert at_once.values[column] < 1e-3
+    assert found.whiteness <= 1.0
+    # In proportion to the mass, which is given too large.
+    assert found.values[column] == pytest.approx(0.35 * 0.365 / 0.35, rel=1e-3)

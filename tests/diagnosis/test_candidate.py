@@ -14,6 +14,7 @@ from hwid_cli.diagnosis.candidate import (
     present_start,
     rebuilt,
     screen,
+    start_values,
 )
 from hwid_cli.diagnosis.few_samples import fewer_recordings
 from hwid_cli.diagnosis.parameters import (
@@ -395,5 +396,6 @@ def test_an_effect_of_the_simulation_that_has_vanished_comes_back(pushed, share,
     present = {"sensor_drift": {"drift_m_per_s": stated}}
     begun = present_start(found, present)["sensor_drift"]["drift_m_per_s"]
     assert begun == pytest.approx(start * stated)
+    assert start_values(found, present)["sensor_drift"]["drift_m_per_s"] == begun
     exact = fitted_values(found, present)["sensor_drift"]["drift_m_per_s"]
     assert exact == pytest.approx(share * stated)
