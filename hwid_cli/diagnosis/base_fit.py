@@ -13,6 +13,8 @@ from hwid_cli.diagnosis.candidate import (
     base_of,
     compared_with_fit,
     fit_candidate,
+    fitted_drive,
+    present_start,
     start_from,
     with_input_noise,
 )
@@ -42,6 +44,9 @@ LINE_SHARE = 0.3
 _LEAST_OF_NOISE = 0.5
 
 
+# A base that leaves at most this share of what another one leaves beyond the noise has
+# found a better minimum.
+_MUCH_LESS = 0.5
 # Parameters of what repeats along the way or in time: each has many minima.
 _REPEATS = {"period_m", "per_turn", "frequency_Hz"}
 
@@ -85,7 +90,14 @@ def fitted_base(problem: DiagnosisProblem) -> FittedBase:
     reversal = find_reversal(problem, base, scales, noise)
     if reversal is not None:
         raise ReversedInputError(reversal)
-    base = with_input_noise(problem, base, scales, noise)
+    return _with_causes(FittedBase(problem, noise, given, scales, base))
+
+
+def _with_causes(fitted: FittedBase) -> FittedBase:
+    """What measuring alone explains of what a base leaves."""
+    noise, given, scales = fitted.noise, fitted.given, fitted.scales
+    problem = fitted.problem
+    base = with_input_noise(problem, fitted.base, scales, noise)
     problem, base = with_zeros(problem, base, scales, noise)
     problem, base = with_earlier_input(problem, base, scales, noise)
     if base.cause in ("zeros", *LATE_INPUT):
@@ -93,6 +105,34 @@ def fitted_base(problem: DiagnosisProblem) -> FittedBase:
     if base.is_usable:
         scales = scales_of_fit(problem, base, scales, noise)
     return FittedBase(problem, noise, given, scales, base)
+
+
+def fitted_from(fitted: FittedBase, found: CandidateFit) -> FittedBase | None:
+    """The base fitted from where an effect beside it has led it.
+
+    A base that ended in a minimum of its own looks as if an effect were missing; the
+    effect makes up for that, and leads out of it.
+
+    Parameters
+    ----------
+    found : CandidateFit
+        With the effect, which is left out.
+
+    Returns
+    -------
+    FittedBase or None
+        None where that does not leave much less than the base.
+    """
+    problem, present = fitted.problem, drive_effects(fitted.problem.drive)
+    drive = fitted_drive(problem.drive, found)
+    start = SearchStart(base_of(drive), present_start(found, present))
+    base = fit_candidate(problem, (), [start], fitted.scales, fitted.noise)
+    base = fit_through_pieces(problem, base, fitted.scales, fitted.noise)
+    floor = problem.n_evaluated * fitted.noise.rms**2
+    excess = [float(one.sse.sum()) - floor for one in (base, fitted.base)]
+    if not base.is_usable or excess[0] > _MUCH_LESS * excess[1]:
+        return None
+    return _with_causes(replace(fitted, base=base))
 
 
 def compared_as_given(problem: DiagnosisProblem) -> list[Compared]:

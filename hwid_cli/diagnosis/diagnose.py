@@ -10,7 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.base_fit import FittedBase, compared_as_given, fitted_base
+from hwid_cli.diagnosis.base_fit import (
+    FittedBase,
+    compared_as_given,
+    fitted_base,
+    fitted_from,
+)
 from hwid_cli.diagnosis.candidate import (
     Baseline,
     compared_with_fit,
@@ -54,7 +59,12 @@ from hwid_cli.diagnosis.problem import (
 )
 from hwid_cli.diagnosis.residual_noise import residual_noise
 from hwid_cli.diagnosis.rounds import RoundsResult, continue_rounds, run_rounds
-from hwid_cli.diagnosis.selection import LEAST_GAIN, SelectionCriteria, title_of
+from hwid_cli.diagnosis.selection import (
+    LEAST_EXPLAINED_SET,
+    LEAST_GAIN,
+    SelectionCriteria,
+    title_of,
+)
 from hwid_cli.diagnosis.set_fits import Rounds
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
 from hwid_cli.diagnosis.verdict import decide
@@ -321,6 +331,39 @@ def _searched(
     fitted = fitted_base(problem)
     if isinstance(options.hold_out, str):
         fitted = _with_odd_ones_trained(fitted)
+    searched = _beside(fitted, options, run_tasks, on_round, given_sse)
+    better = _better_base(fitted, searched)
+    if better is None:
+        return searched
+    return _beside(better, options, run_tasks, on_round, given_sse)
+
+
+def _better_base(fitted: FittedBase, searched: _Searched) -> FittedBase | None:
+    """The base from where the best single effect has led it, if that leaves much less.
+
+    A drive that stands for another simulation has a base that is near in any case.
+    """
+    rounds = searched.rounds
+    singles = [
+        one
+        for one in searched.found.fits.values()
+        if len(one.effects) == 1 and one.is_usable
+    ]
+    if not searched.has_gap or not singles or rounds.criteria.standing is not None:
+        return None
+    best = max(singles, key=lambda one: rounds.criteria.gain(one, rounds.base))
+    explained = rounds.criteria.evidence(best, rounds.base).explained
+    return fitted_from(fitted, best) if explained >= LEAST_EXPLAINED_SET else None
+
+
+def _beside(
+    fitted: FittedBase,
+    options: DiagnoseOptions,
+    run_tasks: RunTasks,
+    on_round: OnRound,
+    given_sse: np.ndarray | None,
+) -> _Searched:
+    """Search for sets of effects beside a base."""
     problem, noise, base = fitted.problem, fitted.noise, fitted.base
     drive = fitted_drive(problem.drive, base)
     before = compared_with_fit(problem, base, fitted.scales)

@@ -302,7 +302,9 @@ def needs_each(
 
 def _is_small_beside_impacts(criteria: SelectionCriteria, part: CandidateFit) -> bool:
     """Whether a set in which impacts follow from earlier ones leaves little."""
-    return is_rugged(part.effects) and criteria.ratio(part) <= STILL_LARGE
+    # Terms of a law are in no catalogue.
+    known = [one for one in part.effects if one in CATALOGUE]
+    return is_rugged(known) and criteria.ratio(part) <= STILL_LARGE
 
 
 def _nearly_completes(

@@ -7,7 +7,9 @@ import pytest
 
 from hwid_cli.diagnosis import base_fit
 from hwid_cli.diagnosis.candidate import with_input_noise
+from hwid_cli.diagnosis.diagnose import find
 from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import (
     DRIVE,
     NOISE,
@@ -18,6 +20,10 @@ from tests.diagnosis.small_drive import (
     sizes,
     white,
 )
+
+
+def in_turn(tasks, *, keep):
+    return [one.function(*one.arguments) for one in tasks]
 
 
 @pytest.mark.parametrize(("times", "kept"), [(1.5, 1.5), (5.0, 1.0)])
@@ -93,9 +99,8 @@ def test_a_period_that_the_simulation_states_is_not_lost_while_the_base_is_off()
     assert found.values[column] == pytest.approx(4e-3, rel=1e-4)
 
 
-@pytest.mark.thorough
-def test_friction_that_a_fit_has_lost_comes_back_by_way_of_pieces():
-    """On a hardening spring a fit of all at once jumps beside the resonance."""
+def hardening_stage():
+    """Recordings of a lightly damped stage with friction, beside it with wrong values."""
     drive = replace(
         DRIVE,
         mass_kg=0.35,
@@ -103,24 +108,57 @@ def test_friction_that_a_fit_has_lost_comes_back_by_way_of_pieces():
         stiffness_N_per_m=2600.0,
         force_constant_N_per_A=9.5,
     )
-    friction = {"coulomb_friction": {"force_N": 0.35}}
-    spring = {"cubic_stiffness": {"stiffness_N_per_m3": 2.2e7}}
-    given = problem(
-        recordings({**friction, **spring}, drive=drive, noise=2e-6),
-        mass_kg=0.365,
-        damping_N_s_per_m=4.9,
-        stiffness_N_per_m=2500.0,
-        force_constant_N_per_A=9.2,
-        effects={
+    effects = {
+        "coulomb_friction": {"force_N": 0.35},
+        "cubic_stiffness": {"stiffness_N_per_m3": 2.2e7},
+    }
+    wrong = {
+        "mass_kg": 0.365,
+        "damping_N_s_per_m": 4.9,
+        "stiffness_N_per_m": 2500.0,
+        "force_constant_N_per_A": 9.2,
+        "effects": {
             "coulomb_friction": {"force_N": 0.33},
             "cubic_stiffness": {"stiffness_N_per_m3": 2.05e7},
         },
-    )
-    at_once = fit(given)
-    found = base_fit.fitted_base(given).base
-    column = [one.parameter for one in found.names].index("force_N")
+    }
+    return recordings(effects, drive=drive, noise=2e-6), wrong
 
-    assert at_once.values[column] < 1e-3
+
+def friction_of(found):
+    column = [one.parameter for one in found.names].index("force_N")
+    return found.values[column]
+
+
+# In proportion to the mass, which is given too large.
+FRICTION = pytest.approx(0.35 * 0.365 / 0.35, rel=1e-3)
+
+
+@pytest.mark.thorough
+def test_friction_that_a_fit_has_lost_comes_back_by_way_of_pieces():
+    """On a hardening spring a fit of all at once jumps beside the resonance."""
+    read, wrong = hardening_stage()
+    given = problem(read, **wrong)
+    found = base_fit.fitted_base(given).base
+
+    assert friction_of(fit(given)) < 1e-3
     assert found.whiteness <= 1.0
-    # In proportion to the mass, which is given too large.
-    assert found.values[column] == pytest.approx(0.35 * 0.365 / 0.35, rel=1e-3)
+    assert friction_of(found) == FRICTION
+
+
+@pytest.mark.thorough
+def test_a_base_that_is_stuck_is_fitted_from_where_an_effect_has_led_it(monkeypatch):
+    """Else the stage that lacks nothing is unknown, at 130 times the noise."""
+    monkeypatch.setattr(base_fit, "fit_through_pieces", lambda _, found, *__: found)
+    read, wrong = hardening_stage()
+    options = DiagnoseOptions(
+        hold_out=("step_1", "sine_1"), effects=("stribeck_friction", "end_stop")
+    )
+    found = find(
+        problem(read, held_out=options.hold_out, options=options, **wrong),
+        options, in_turn, lambda what, total: None,
+    )  # fmt: skip
+
+    assert found.verdict.word == "parameters"
+    assert found.base.whiteness <= 1.0
+    assert friction_of(found.base) == FRICTION
