@@ -38,6 +38,7 @@ from hwid_cli.data.long_tables import (
 )
 from hwid_cli.data.table_columns import (
     ColumnParts,
+    begun_together,
     column_named,
     found_columns,
     titles_of,
@@ -155,6 +156,7 @@ def read_csv_columns(
         titles |= dict.fromkeys(pair, f"{role} {wanted[role]!r}")
     # Without a clock, nobody can tell whether a second head begins a second recording.
     read = _read_body(sheet, titles, keep_heads="time" not in wanted)
+    read = begun_together(read, sheet.head)
     return [
         *(
             (role, with_unit(path, read[place], role, sheet.head, place))
@@ -186,6 +188,7 @@ def list_csv_columns(path: Path) -> tuple[FoundColumn, ...]:
     width = max(map(len, sheet.rows[head.body :]))
     places = [place for place in range(width) if place not in head.texts]
     read = _read_body(sheet, {place: f"column {place}" for place in places})
+    read = begun_together(read, head)
     return with_joined_stamps(found_columns(read, head))
 
 

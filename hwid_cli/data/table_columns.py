@@ -14,7 +14,7 @@ from hwid_cli.data.cells import (
     stamp_reader,
     writing_of,
 )
-from hwid_cli.data.columns import MeasuredColumn
+from hwid_cli.data.columns import MeasuredColumn, keep_rows
 from hwid_cli.data.table_heads import TableHead
 from hwid_cli.data.units import unit_in_name
 from hwid_cli.errors import MeasurementError, MissingColumnError
@@ -192,6 +192,26 @@ def _values(
         if value is None:
             missed[number] = cell
     return values, missed
+
+
+def begun_together(
+    read: Mapping[int, MeasuredColumn], head: TableHead
+) -> dict[int, MeasuredColumn]:
+    """Columns without what they hold before the last of them begins.
+
+    Only where the head states when each begins, and how far its samples are apart: then no
+    column of the file is a clock.
+    """
+    starts = [head.starts.get(place) for place in read]
+    steps = {step_s for _, step_s in head.settings}
+    known = [one for one in starts if one is not None]
+    if len(known) < len(starts) or len(steps) != 1 or len(set(known)) < 2:
+        return dict(read)
+    (step_s,), last = steps, max(known)
+    return {
+        place: keep_rows(one, slice(round((last - start) / step_s), None))
+        for (place, one), start in zip(read.items(), known, strict=True)
+    }
 
 
 def column_named(key: str, header: Sequence[str], role: str, place: str) -> int:

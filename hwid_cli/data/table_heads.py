@@ -51,6 +51,7 @@ _SCALE_WORDS = frozenset(
         *("skalierungsfaktor", "umrechnungsfaktor", "resolution", "auflösung", "lsb"),
     ]
 )
+_STARTS_WORD = "x0"
 _TIME_WORDS = frozenset(("time", "zeit", "timestamp", "t", "x", "xvalue"))
 _INTERVAL_WORDS = frozenset(
     [
@@ -106,6 +107,8 @@ class TableHead:
         Sample times that the rows state, with the words in front of them.
     scales : dict of int to float
         By column, where a row of factors states another one than 1.
+    starts : dict of int to float, [s]
+        By column, where a row states when each begins (LabVIEW's X0).
     said : dict of int to str
         By column, what a row above says of it: of ``CH1`` that it is the current.
     """
@@ -119,6 +122,7 @@ class TableHead:
     settings: tuple[tuple[str, float], ...] = ()
     scales: dict[int, float] = field(default_factory=dict)
     said: dict[int, str] = field(default_factory=dict)
+    starts: dict[int, float] = field(default_factory=dict)
 
 
 def sample_time_named(title: str, value: float, unit: str = "") -> float | None:
@@ -253,6 +257,7 @@ def read_head(
         units,
         settings=_settings(rows, body, numeric),
         scales=_scales(rows[:body], numeric),
+        starts=_starts(rows[:body], numeric),
         said=said,
     )
 
@@ -479,6 +484,17 @@ def _scales(above: Sequence[Sequence[str]], numeric: Sequence[int]) -> dict[int,
                 value = plain_number(cell.replace(",", "."))
                 if value is not None and value not in (0.0, 1.0):
                     found[place] = value
+    return found
+
+
+def _starts(above: Sequence[Sequence[str]], numeric: Sequence[int]) -> dict[int, float]:
+    """Times at which columns begin, of a row that states them."""
+    row = next((one for one in above if one and one[0].lower() == _STARTS_WORD), [])
+    found = {}
+    for place, cell in zip(numeric, _cells(row, numeric), strict=True):
+        value = plain_number(cell.replace(",", "."))
+        if value is not None:
+            found[place] = value
     return found
 
 

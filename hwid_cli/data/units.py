@@ -28,8 +28,15 @@ QUANTITIES = {
 }
 # Numbers that have no unit, or whose unit nobody wants to say.
 UNITLESS = "-"
+# Whole words, which instruments begin with a capital.
+_WORDS = (
+    *("Volts", "Millivolts", "Amperes", "Milliamps", "Milliamperes", "Newtons"),
+    *("Meters", "Metres", "Millimeters", "Millimetres", "Micrometers", "Microns"),
+    *("Degrees", "Radians", "Milliradians", "Milliseconds", "Microseconds"),
+)
 # How laboratories write units that pint reads otherwise or not at all.
 _SPELLINGS = {
+    **{word: word.lower() for word in _WORDS},
     "Nm": "N*m",
     "mNm": "mN*m",
     "kNm": "kN*m",

@@ -773,3 +773,27 @@ def signals_in_files_of_their_own(folder):
             _put(folder / f"test{number}_{name}.csv", [head, *rows])
         written.append(Written(u[first:], 1e-3 * y[first:], "A", "m"))
     return written
+
+
+@layout
+def labview_with_channels_that_begin_apart(folder):
+    """``X_Columns No``: X0 and Delta_X are the only times, and the output begins later."""
+    written = []
+    for number, (name, (_, u, y)) in enumerate(zip(NAMES, RUNS, strict=True)):
+        late = 5 + number
+        head = [
+            *("LabVIEW Measurement\t", "X_Columns\tNo", "***End_of_Header***\t", "\t"),
+            *(
+                "Channels\t2\t\t",
+                f"Samples\t{N}\t{N - late}\t",
+                "Y_Unit_Label\tVolts\tmm\t",
+            ),
+            *("X_Dimension\tTime\tTime\t", f"X0\t0.0000E+0\t{late * STEP_S:.4E}\t"),
+            *(f"Delta_X\t{STEP_S}\t{STEP_S}\t", "***End_of_Header***\t\t\t"),
+            "X_Value\tCommand (AO0)\tPosition (AI1)\tComment",
+        ]
+        ends = [*map(_number, y[late:]), *[""] * late]
+        rows = [f"\t{_number(one)}\t{end}" for one, end in zip(u, ends, strict=True)]
+        _put(folder / f"{name}.lvm", head + rows, end="\r\n")
+        written.append(Written(u[late:], 1e-3 * y[late:], "V", "m"))
+    return written
