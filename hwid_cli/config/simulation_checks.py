@@ -98,6 +98,7 @@ def known_faults(experiment: Experiment) -> Iterator[Fault]:
     is_force = recordings is not None and recordings.input_unit in FORCES
     inside = BASE_AND_MASS if is_force else BASE_PARAMETERS
     names = [name_on(axis_of(options), one) for one in inside]
+    names += ["inductance_H"] if options.inductance_H > 0 else []
     for name, tolerance in options.known.items():
         place = ("simulation", "known")
         if name not in (*names, *inside):

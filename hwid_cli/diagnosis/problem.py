@@ -13,7 +13,7 @@ import scipy
 
 from hwid_cli.drive.simulation import NO_FORCE, refined
 from hwid_cli.records.axis import base_of, name_inside
-from hwid_cli.records.drive import LINE, SOURCES, UNSAID_HOLD, Drive
+from hwid_cli.records.drive import LINE, SOURCES, UNSAID_HOLD, WINDING, Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
 
@@ -344,6 +344,8 @@ def prepare(
     signals = tuple(_signals(one, simulation, options, held_out) for one in recordings)
     train = [one for one in signals if not one.is_held_out] or list(signals)
     drive = drive_of(simulation, train, recordings[0].input_unit)
+    if "inductance_H" not in simulation.known:
+        drive = _with_free_winding(drive)
     return DiagnosisProblem(
         signals,
         drive,
@@ -355,6 +357,17 @@ def prepare(
         {name_inside(name): share for name, share in simulation.known.items()},
         may_be_held=simulation.hold == UNSAID_HOLD and simulation.controller is None,
     )
+
+
+def _with_free_winding(drive: Drive) -> Drive:
+    """Drive whose inductance is an effect of the simulation, which a re-fit may move.
+
+    An inductance that is off would be one that is missing.
+    """
+    if drive.inductance_H == 0 or WINDING in drive.effects:
+        return drive
+    effects = {**drive.effects, WINDING: {"inductance_H": drive.inductance_H}}
+    return replace(drive, effects=effects, inductance_H=0.0)
 
 
 def _start_of(drive: Drive, initial_state: str) -> str:

@@ -45,6 +45,8 @@ CASCADE_KEYS = ("position_gain_per_s", "velocity_gain", "reset_rate_per_s")
 PID_KEYS = ("proportional_gain", "integral_gain", "derivative_gain")
 # What may differ between recordings (effect ``parameter_change``).
 CHANGING = ("stiffness", "force_constant", "damping", "mass")
+# The effect that an inductance of the simulation is where a re-fit moves it.
+WINDING = "winding_inductance"
 # Marks the id of an effect that is there for the second time.
 SECOND = ":second"
 EffectValues = dict[str, float | str]

@@ -23,7 +23,7 @@ from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.files.figure_files import read_figure, write_figure
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.diagnosis import Diagnosis
-from hwid_cli.records.drive import UNSAID_HOLD, DriveResponse, told_apart
+from hwid_cli.records.drive import UNSAID_HOLD, WINDING, DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions, Experiment, SimulationOptions
 from hwid_cli.records.programs import ForeignSimulation
 from hwid_cli.records.recordings import CalibrationLog, Recording
@@ -166,12 +166,18 @@ def extended_options(
         With a re-fitted base only, where no effect was found.
     """
     base: dict[str, Any] = {one.name: one.after for one in diagnosis.base}
+    is_own = simulation.inductance_H > 0 and WINDING not in simulation.effects
+    for effect in diagnosis.present:
+        if is_own and effect.id == WINDING:
+            # The simulation has it among its own parameters.
+            base["inductance_H"] = effect.parameters[0].value
     effects = [
         (
             effect.own or effect.id,
             {one.name: one.text or one.value for one in effect.parameters},
         )
         for effect in (*diagnosis.present, *diagnosis.effects)
+        if not (is_own and effect.id == WINDING)
     ]
     return replace(
         simulation,

@@ -325,6 +325,7 @@ def test_a_current_with_a_state_has_a_start_of_its_own(
 def test_a_winding_of_the_base_has_a_start_of_its_own():
     options = DiagnoseOptions(initial_state="estimated")
     changes = {"resistance_ohm": 2.0, "inductance_H": 4e-3}
+    changes["known"] = {"inductance_H": 0.0}
     of = problem(recordings()[:3], options=options, **changes)
     _, found, _ = laid_out(of=of)
     assert [one.name for one in found.own] == ["position", "velocity", "current"]

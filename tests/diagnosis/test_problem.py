@@ -219,7 +219,7 @@ def test_every_setting_of_the_simulation_reaches_the_drive():
         inductance_H=10.0,
         back_emf_V_s_per_m=11.0,
         hold="smooth",
-        known={"damping_N_s_per_m": 0.1},
+        known={"damping_N_s_per_m": 0.1, "inductance_H": 0.0},
         output="velocity",
     )
     problem = prepare([TRAIN], simulation, DiagnoseOptions(), [])
@@ -227,6 +227,15 @@ def test_every_setting_of_the_simulation_reaches_the_drive():
     for name in vars(simulation):
         if name not in ("kind", "known", *ROTARY_NAMES.values()):
             assert getattr(problem.drive, name) == getattr(simulation, name), name
+
+
+def test_an_inductance_that_may_be_fitted_again_is_an_effect_of_the_simulation():
+    simulation = SimulationOptions(
+        mass_kg=2.0, force_constant_N_per_A=5.0, resistance_ohm=9.0, inductance_H=0.01
+    )
+    drive = prepare([TRAIN], simulation, DiagnoseOptions(), []).drive
+    assert drive.inductance_H == 0.0
+    assert drive.effects == {"winding_inductance": {"inductance_H": 0.01}}
 
 
 def test_a_rotating_axis_reaches_the_drive_by_the_names_of_a_straight_one():

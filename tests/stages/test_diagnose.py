@@ -50,6 +50,33 @@ def test_nothing_is_missing_where_the_simulation_is_right():
     assert found.after.ratio_to_noise < 1.05
 
 
+CIRCUIT = {"resistance_ohm": 2.0, "inductance_H": 6e-3}
+
+
+def test_a_wrong_inductance_is_no_missing_one():
+    read = recordings(drive=replace(DRIVE, **CIRCUIT))
+    wrong = simulation(**{**CIRCUIT, "inductance_H": 5e-3})
+    found = diagnosed(read, wrong, effects=("winding_inductance", "actuator_lag"))
+
+    assert (found.verdict, found.complete, found.effects) == ("parameters", True, ())
+    (winding,) = found.present
+    assert winding.id == "winding_inductance"
+    assert winding.parameters[0].value == pytest.approx(6e-3, rel=0.01)
+    extended = extended_options(found, wrong)
+    assert extended.inductance_H == winding.parameters[0].value
+    assert extended.effects == {}
+
+
+def test_an_inductance_that_is_known_stays():
+    read = recordings(drive=replace(DRIVE, **CIRCUIT))
+    known = simulation(**{**CIRCUIT, "inductance_H": 5e-3}, known={"inductance_H": 0.0})
+    found = diagnosed(read, known, effects=("winding_inductance", "actuator_lag"))
+
+    assert found.verdict == "named"
+    assert [one.id for one in found.effects] == ["winding_inductance"]
+    assert extended_options(found, known).inductance_H == 5e-3
+
+
 def test_wrong_parameters_are_no_missing_effect():
     wrong = simulation(force_constant_N_per_A=5.3, damping_N_s_per_m=12.0)
     found = diagnosed(recordings(), wrong)
