@@ -6,11 +6,14 @@ one of them. Pieces with starts of their own forget that, and lead near the best
 """
 
 from hwid_cli.diagnosis.candidate import (
+    SearchStart,
+    base_of,
     compared_with_fit,
     fit_candidate,
     fitted_drive,
     start_from,
 )
+from hwid_cli.diagnosis.growing import fit_grown
 from hwid_cli.diagnosis.latent_force import latent_force
 from hwid_cli.diagnosis.pieces import in_pieces
 from hwid_cli.diagnosis.problem import DiagnosisProblem
@@ -43,10 +46,17 @@ def fit_through_pieces(
     compared = compared_with_fit(problem, found, scales)
     smoothed = latent_force(compared, fitted_drive(problem.drive, found), noise)
     pieces = in_pieces(problem, smoothed, are_free=True)
-    start = start_from(problem.drive, found)
-    of_pieces = fit_candidate(pieces, found.effects, [start], scales, noise)
+    # A fit that is lost has bent everything: what is stated may be nearer.
+    stated = SearchStart(base_of(problem.drive), drive_effects(problem.drive))
+    starts = [start_from(problem.drive, found), stated]
+    of_pieces = fit_candidate(pieces, found.effects, starts, scales, noise)
     if not of_pieces.is_usable:
         return found
     start = start_from(problem.drive, of_pieces)
     again = fit_candidate(problem, found.effects, [start], scales, noise)
-    return min((found, again), key=lambda one: float(one.sse.sum()))
+    best = min((found, again), key=lambda one: float(one.sse.sum()))
+    if best.whiteness <= 1.0:
+        return best
+    # From there a long recording still has many minima, and its first part few.
+    grown = fit_grown(problem, best, [start], scales, noise)
+    return min((best, grown), key=lambda one: float(one.sse.sum()))

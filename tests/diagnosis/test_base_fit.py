@@ -8,8 +8,11 @@ import pytest
 from hwid_cli.diagnosis import base_fit
 from hwid_cli.diagnosis.candidate import with_input_noise
 from hwid_cli.diagnosis.diagnose import find
+from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.drive import Controller, Drive
 from hwid_cli.records.experiment import DiagnoseOptions
+from hwid_cli.records.recordings import Recording
 from tests.diagnosis.small_drive import (
     DRIVE,
     NOISE,
@@ -144,6 +147,55 @@ def test_friction_that_a_fit_has_lost_comes_back_by_way_of_pieces():
     assert friction_of(fit(given)) < 1e-3
     assert found.whiteness <= 1.0
     assert friction_of(found) == FRICTION
+
+
+@pytest.mark.thorough
+def test_a_free_axis_with_friction_is_followed_from_its_logged_command():
+    """Played back, a fit of all at once is centimetres away: 4000 times the noise."""
+    effects = {
+        "stribeck_friction": {
+            "force_N": 9.0, "static_excess_N": 4.0, "velocity_m_per_s": 0.02,
+        },
+        "cogging": {"amplitude_N": 3.2, "period_m": 0.032, "phase_rad": 0.7},
+    }  # fmt: skip
+    axis = Drive(
+        mass_kg=12.0,
+        damping_N_s_per_m=35.0,
+        stiffness_N_per_m=0.0,
+        force_constant_N_per_A=42.0,
+        effects=effects,
+        controller=Controller(
+            position_gain_per_s=30.0, velocity_gain=25.0, reset_rate_per_s=20.0
+        ),
+        hold="zero",
+    )
+    time, rng = 1e-3 * np.arange(4000), np.random.default_rng(4)
+    moves = ((0.12, 0.2, 0.5), (-0.2, 1.2, 0.6), (0.15, 2.4, 0.4), (-0.05, 3.5, 0.2))
+    there_and_back = sum(a * np.clip((time - t) / d, 0, 1) for a, t, d in moves)
+    swing = 0.06 * np.sin(2 * np.pi * 1.2 * np.maximum(time - 0.1, 0.0))
+    read = []
+    for number, reference in enumerate((there_and_back, swing)):
+        motion = simulate_drive(reference, axis, sample_time_s=1e-3)
+        output = motion.output + 1e-6 * rng.standard_normal(time.size)
+        read.append(Recording(f"run_{number}", motion.command, output, 1e-3))
+    given = problem(
+        read,
+        mass_kg=12.4,
+        damping_N_s_per_m=33.0,
+        stiffness_N_per_m=0.0,
+        force_constant_N_per_A=40.9,
+        hold="zero",
+        effects={
+            "stribeck_friction": {
+                "force_N": 8.6, "static_excess_N": 4.3, "velocity_m_per_s": 0.021,
+            },
+            "cogging": {"amplitude_N": 3.05, "period_m": 0.032, "phase_rad": 0.74},
+        },
+    )  # fmt: skip
+    found = base_fit.fitted_base(given).base
+
+    assert found.whiteness <= 1.0
+    assert friction_of(found) == pytest.approx(9.0 * 12.4 / 12.0, rel=1e-4)
 
 
 @pytest.mark.thorough
