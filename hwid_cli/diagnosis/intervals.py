@@ -3,7 +3,8 @@
 docs/method_diagnosis.md, eq. (D20).
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
@@ -38,7 +39,8 @@ def unclear_effects(
     """Effects of a fit that may as well not be there, or be a simpler one.
 
     The interval of an effect's strength reaches zero, or that of the parameter that tells
-    it from what it contains; or its strength went as far as it may: it imitates.
+    it from what it contains; or its strength went as far as it may: it imitates. What the
+    simulation has of the latter shares the strength in any way, and is held for that.
 
     Returns
     -------
@@ -48,9 +50,10 @@ def unclear_effects(
     if not found.is_usable:
         return found.effects
     fit_layout, point = rebuilt(problem, found, scales)
-    spread = _spread(problem, found, fit_layout, point)
+    of_all = _spread(problem, found, fit_layout, point)
 
     def is_clear(ref: ParameterRef) -> bool:
+        spread = of_all.beside(_contained(ref.owner, found.effects, fit_layout))
         column = found.names.index(ref)
         unknown, q = fit_layout.shared[column], point.shared[column]
         if _is_at_bound(unknown, q):
@@ -64,6 +67,18 @@ def unclear_effects(
         for effect in found.effects
         if not all(map(is_clear, _telling(effect, found.names)))
     )
+
+
+def _contained(
+    effect: str, found: Sequence[str], fit_layout: ParameterLayout
+) -> list[int]:
+    """Strengths of effects of the simulation that an effect contains, by column."""
+    limits = set(CATALOGUE[effect].contains) - set(found)
+    return [
+        column
+        for column, one in enumerate(fit_layout.shared)
+        if one.owner in limits and one.name == CATALOGUE[one.owner].strongest.name
+    ]
 
 
 def runs_to_bound(
@@ -197,6 +212,14 @@ class _Spread:
             variance = max(float(weights @ self.covariance @ weights), 0.0)
         farthest = np.max(np.abs(self.away @ direction), initial=0.0)
         return float(np.hypot(QUANTILE * np.sqrt(variance), 2 * farthest))
+
+    def beside(self, held: Sequence[int]) -> "_Spread":
+        """The same where some coordinates are what they are."""
+        if not held:
+            return self
+        across = self.covariance[:, held]
+        among = np.linalg.pinv(self.covariance[np.ix_(held, held)])
+        return replace(self, covariance=self.covariance - across @ among @ across.T)
 
     def reaches(self) -> np.ndarray:
         """Of each coordinate alone."""

@@ -35,6 +35,24 @@ def test_a_law_that_may_be_the_simpler_one_is_left_open(true, unclear):
     assert unclear_effects(given, found, scales) == unclear
 
 
+@pytest.mark.parametrize(
+    ("true", "unclear"),
+    [
+        ({"coulomb_friction": {"force_N": 0.8}}, ("stribeck_friction",)),
+        ({"stribeck_friction": STRIBECK}, ()),
+    ],
+)
+def test_what_the_simulation_has_of_a_law_shares_its_strength_in_any_way(true, unclear):
+    """Plain friction of both adds up: neither has a size of its own."""
+    plain = {"coulomb_friction": {"force_N": 0.5}}
+    given = problem(recordings(true), effects=plain)
+    scales = sizes(problem())
+    start = {"force_N": 0.3, "static_excess_N": 0.05, "velocity_m_per_s": 0.02}
+    found = fit(given, {"stribeck_friction": start}, scales=scales)
+
+    assert unclear_effects(given, found, scales) == unclear
+
+
 CONTACT = "one_sided_stop:contact"
 
 

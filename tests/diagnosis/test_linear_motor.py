@@ -97,7 +97,10 @@ def test_cogging_and_friction_of_a_free_axis_are_told_as_its_recipe_starts_it():
 @pytest.mark.parametrize(
     ("stated", "rest"), [({}, np.sin(PHASE)), ({"zero_at": "mean"}, 0.0)]
 )
-def test_cogging_is_about_where_the_drive_rests_or_about_its_mean(stated, rest):
+@pytest.mark.parametrize("second", [0.0, 0.5 * AMPLITUDE])
+def test_cogging_is_about_where_the_drive_rests_or_about_its_mean(stated, rest, second):
+    more = {"amplitude_N": second, "period_m": PERIOD / 2, "phase_rad": 2.0}
+    second_rest = np.sin(2.0) if rest else 0.0
     drive = Drive(
         mass_kg=MASS,
         damping_N_s_per_m=DAMPING,
@@ -109,7 +112,8 @@ def test_cogging_is_about_where_the_drive_rests_or_about_its_mean(stated, rest):
                 "period_m": PERIOD,
                 "phase_rad": PHASE,
                 **stated,
-            }
+            },
+            **({"cogging:second": more} if second else {}),
         },
     )
     current = np.full(400, 1.0)
@@ -120,6 +124,8 @@ def test_cogging_is_about_where_the_drive_rests_or_about_its_mean(stated, rest):
     for n in range(1, 400):
         for _ in range(200):
             force = PUSH - DAMPING * v + cogging(x) - AMPLITUDE * rest
+            swing = np.sin(4 * np.pi * x / PERIOD + 2.0) - second_rest
+            force += second * swing
             v += STEP_S / 200 * force / MASS
             x += STEP_S / 200 * v
         expected[n] = x

@@ -304,6 +304,7 @@ COGGING_SECOND = replace(
     COGGING,
     id="cogging:second",
     sentence="a second force that repeats along the way, with another period",
+    equation="F = A (sin(2 pi x / l + q) - sin(q)), or about its mean as the first one",
     parameters=tuple(
         replace(one, places=tuple(f"SECOND_{place}" for place in one.places))
         for one in COGGING.parameters

@@ -116,6 +116,8 @@ def cogging(x: float, p: np.ndarray) -> float:
 def second_cogging(x: float, p: np.ndarray) -> float:
     """Return the force that repeats along the way with another period.
 
+    It has its zero where the first one has it.
+
     Parameters
     ----------
     x : float, [m]
@@ -123,7 +125,8 @@ def second_cogging(x: float, p: np.ndarray) -> float:
     """
     angle = TURN * (x - p[slots.COGGING_ORIGIN]) / p[slots.SECOND_COGGING_PERIOD]
     phase = p[slots.SECOND_COGGING_PHASE]
-    return p[slots.SECOND_COGGING_FORCE] * (np.sin(angle + phase) - np.sin(phase))
+    rest = np.sin(phase) if p[slots.COGGING_ABOUT_MEAN] == 0.0 else 0.0
+    return p[slots.SECOND_COGGING_FORCE] * (np.sin(angle + phase) - rest)
 
 
 @compiled(**INNER)

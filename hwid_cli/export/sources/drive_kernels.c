@@ -1238,9 +1238,11 @@ static double drive_second_cogging(double x, double *p)
 {
     double angle = 0.0;
     double phase = 0.0;
+    double rest = 0.0;
     angle = (6.283185307179586 * (x - p[COGGING_ORIGIN])) / p[SECOND_COGGING_PERIOD];
     phase = p[SECOND_COGGING_PHASE];
-    return p[SECOND_COGGING_FORCE] * (sin(angle + phase) - sin(phase));
+    rest = (p[COGGING_ABOUT_MEAN] == 0.0) ? sin(phase) : 0.0;
+    return p[SECOND_COGGING_FORCE] * (sin(angle + phase) - rest);
 }
 
 static double drive_bent_motion(double into, double bend)
