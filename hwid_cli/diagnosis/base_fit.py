@@ -11,9 +11,9 @@ import numpy as np
 from hwid_cli.diagnosis.candidate import (
     SearchStart,
     base_of,
+    base_start,
     compared_with_fit,
     fit_candidate,
-    fitted_drive,
     present_start,
     start_from,
     with_input_noise,
@@ -124,8 +124,7 @@ def fitted_from(fitted: FittedBase, found: CandidateFit) -> FittedBase | None:
         None where that does not leave much less than the base.
     """
     problem, present = fitted.problem, drive_effects(fitted.problem.drive)
-    drive = fitted_drive(problem.drive, found)
-    start = SearchStart(base_of(drive), present_start(found, present))
+    start = SearchStart(base_start(problem.drive, found), present_start(found, present))
     base = fit_candidate(problem, (), [start], fitted.scales, fitted.noise)
     base = fit_through_pieces(problem, base, fitted.scales, fitted.noise)
     floor = problem.n_evaluated * fitted.noise.rms**2

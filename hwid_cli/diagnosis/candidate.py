@@ -39,6 +39,7 @@ from hwid_cli.diagnosis.search import (
     fit_point,
     with_own_trials,
 )
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
@@ -92,10 +93,11 @@ class Baseline:
             (getattr(self.given, one), getattr(self.drive, one))
             for one in BASE_AND_MASS
         ]
-        return any(
-            abs(one) > BENT * abs(other) or abs(other) > BENT * abs(one)
-            for one, other in pairs
-        )
+        return any(_is_far(one, other) for one, other in pairs)
+
+
+def _is_far(one: float, other: float) -> bool:
+    return abs(one) > BENT * abs(other) or abs(other) > BENT * abs(one)
 
 
 @dataclass(frozen=True)
@@ -537,7 +539,33 @@ def start_from(drive: Drive, found: CandidateFit) -> SearchStart:
         That was fitted, with the effects that the simulation has.
     """
     values = start_values(found, drive_effects(drive))
-    return SearchStart(base_of(fitted_drive(drive, found)), values)
+    return SearchStart(base_start(drive, found), values)
+
+
+def base_start(drive: Drive, found: CandidateFit) -> dict[str, float]:
+    """Base of a fit as a start, with what it has lost of what the drive states."""
+    stated = base_of(drive)
+    fitted = base_of(fitted_drive(drive, found))
+    return {name: _seen(value, stated[name]) for name, value in fitted.items()}
+
+
+def bends_effects(drive: Drive, found: CandidateFit) -> bool:
+    """Whether a fit has moved the strength of an effect of the simulation far away.
+
+    A winding may imitate a delay, friction a load: what is missing is better looked for
+    beside what is stated.
+    """
+    present = drive_effects(drive)
+    values = _values_by_owner(found)
+    strengths = [
+        (given.get(name), values.get(one, {}).get(name))
+        for one, given in present.items()
+        for name in [CATALOGUE[one].strongest.name]
+    ]
+    return any(
+        stated is not None and value is not None and _is_far(stated, value)
+        for stated, value in strengths
+    )
 
 
 def without_base(found: CandidateFit) -> CandidateFit:

@@ -10,6 +10,7 @@ of candidates follow from the same columns. docs/method_diagnosis.md, eq. (D19).
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from math import inf
 
 import numpy as np
 import scipy
@@ -161,7 +162,11 @@ def forecast(at_base: Linearisation, identifier: str) -> Forecast:
         return Forecast(identifier, 0.0, starts, np.zeros_like(error))
     tried.sort(key=lambda one: -one[0])
     least = PROMISING_START * tried[0][0]
-    starts = tuple(start for share, start, _ in tried[:KEPT_STARTS] if share >= least)
+    kept = [start for share, start, _ in tried[:KEPT_STARTS] if share >= least]
+    if effect.strongest.off == inf:
+        # What a limit cuts is not in proportion to it, least of all in a loop.
+        kept += [start for _, start, _ in tried if start not in kept]
+    starts = tuple(kept)
     return Forecast(identifier, tried[0][0], starts, tried[0][2])
 
 

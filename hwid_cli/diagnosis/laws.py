@@ -17,8 +17,8 @@ import numpy as np
 from hwid_cli.diagnosis.candidate import (
     SearchStart,
     base_of,
+    base_start,
     fit_candidate,
-    fitted_drive,
     present_start,
     start_from,
 )
@@ -564,7 +564,7 @@ def _replaced(
         if name in start and not name.startswith("c"):
             start[name] = value
     identifier = own_id(_name(rounds), effect)
-    base = base_of(fitted_drive(rounds.problem.drive, _fit(one)))
+    base = base_start(rounds.problem.drive, _fit(one))
     present = present_start(rounds.base, drive_effects(rounds.problem.drive))
     search = SearchStart(base, {**present, identifier: start})
     return replace(one, terms=terms, identifier=identifier, start=search, fit=None)
@@ -605,7 +605,7 @@ def _named(rounds: Rounds, one: _Tried, found: RoundsResult) -> CandidateFit | N
 
 def _fit_of(rounds: Rounds, one: _Tried, effects: tuple[str, ...]) -> CandidateFit:
     """Fit effects of the catalogue from their own starts, the base where the law has it."""
-    base = base_of(fitted_drive(rounds.problem.drive, _fit(one)))
+    base = base_start(rounds.problem.drive, _fit(one))
     present = present_start(rounds.base, drive_effects(rounds.problem.drive))
     scales, baseline = rounds.baseline.scales, rounds.baseline
     several = [CATALOGUE[effect].starts(scales) for effect in effects]

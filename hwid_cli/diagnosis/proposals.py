@@ -4,12 +4,16 @@ docs/method_diagnosis.md.
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from math import inf
 
 import numpy as np
 
 from hwid_cli.diagnosis.candidate import (
     SearchStart,
     base_of,
+    base_start,
+    bends_effects,
     fitted_drive,
     fitted_values,
     present_start,
@@ -32,6 +36,7 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.scales import scales_of_fit
 from hwid_cli.diagnosis.set_fits import Rounds
 from hwid_cli.diagnosis.tasks import DiagnosisTask
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 
@@ -95,23 +100,38 @@ class Proposals:
             self.shares.update({(one.effect,): one.share for one in found})
         else:
             found = _most_promising(found)
-        pairs = {
-            one.effect: [(base_of(drive), values) for values in one.starts]
+        base = base_start(rounds.problem.drive, parent)
+        from_fit = SearchStart(base, start_values(parent, present))
+        stated, n_stated = self._stated(parent, present)
+        return {
+            with_effect(parent.effects, one.effect): [
+                replace(begin, effects={**begin.effects, one.effect: values})
+                for begin, starts in (
+                    (from_fit, one.starts),
+                    (stated, _first(one, n_stated)),
+                )
+                for values in starts
+            ]
             for one in found
         }
-        if parent is rounds.base and baseline.given is not None:
-            given = base_of(baseline.given)
-            count = SCREENED_STARTS if baseline.is_bent else 1
-            for one in found:
-                pairs[one.effect] += [(given, values) for values in one.starts[:count]]
-        beside = start_values(parent, present)
-        return {
-            with_effect(parent.effects, effect): [
-                SearchStart(base, {**beside, effect: values})
-                for base, values in several
-            ]
-            for effect, several in pairs.items()
-        }
+
+    def _stated(
+        self, parent: CandidateFit, present: dict[str, dict[str, float]]
+    ) -> tuple[SearchStart, int]:
+        """What the configuration states, as a start, and with how many of an effect.
+
+        Beside a larger set only where that has moved an effect of the simulation far away.
+        """
+        baseline, drive = self.rounds.baseline, self.rounds.problem.drive
+        values = fitted_values(parent, present)
+        own = {one: values[one] for one in parent.effects if one in values}
+        stated = SearchStart(base_of(baseline.given or drive), {**present, **own})
+        is_bent = bends_effects(drive, parent)
+        if parent is not self.rounds.base:
+            return stated, 1 if is_bent else 0
+        if baseline.given is None:
+            return stated, 0
+        return stated, SCREENED_STARTS if is_bent or baseline.is_bent else 1
 
     def _forecast(self, at: Linearisation, candidates: Sequence[str]) -> list[Forecast]:
         """Rank candidates by what they should explain; too quick to be kept."""
@@ -139,6 +159,12 @@ class Proposals:
         for first, second in likely[:LIKELY_PAIRS]:
             both = {one: found[one].starts[0] for one in (first, second)}
             yield with_effect((first,), second), SearchStart(base, {**present, **both})
+
+
+def _first(found: Forecast, count: int) -> Sequence[dict[str, float]]:
+    """So many starts of an effect; of a limit all, which no forecast can rank."""
+    is_limit = count > 0 and CATALOGUE[found.effect].strongest.off == inf
+    return found.starts if is_limit else found.starts[:count]
 
 
 def _most_promising(found: Sequence[Forecast]) -> list[Forecast]:

@@ -11,8 +11,7 @@ import numpy as np
 from hwid_cli.diagnosis.candidate import (
     Screened,
     SearchStart,
-    base_of,
-    fitted_drive,
+    base_start,
     start_from,
     start_values,
 )
@@ -248,4 +247,4 @@ def by_width(sets: Mapping[Effects, _Starts]) -> list[dict[Effects, _Starts]]:
 
 
 def _base_values(fits: SetFits, found: CandidateFit) -> dict[str, float]:
-    return base_of(fitted_drive(fits.rounds.problem.drive, found))
+    return base_start(fits.rounds.problem.drive, found)
