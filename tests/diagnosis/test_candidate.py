@@ -8,6 +8,8 @@ import pytest
 from hwid_cli.diagnosis.candidate import (
     MOST_ITERATIONS,
     SCREENING_SAMPLES,
+    base_start,
+    bends_effects,
     fitted_drive,
     fitted_effects,
     fitted_values,
@@ -399,3 +401,27 @@ def test_an_effect_of_the_simulation_that_has_vanished_comes_back(pushed, share,
     assert start_values(found, present)["sensor_drift"]["drift_m_per_s"] == begun
     exact = fitted_values(found, present)["sensor_drift"]["drift_m_per_s"]
     assert exact == pytest.approx(share * stated)
+
+
+@pytest.mark.parametrize(("share", "start"), [(1e-7, 0.1), (0.5, 0.5), (30.0, 30.0)])
+def test_damping_that_a_fit_has_lost_comes_back(share, start):
+    of = problem(recordings()[:2])
+    found = fit(of)
+    column = [one.parameter for one in found.names].index("damping_N_s_per_m")
+    values = found.values.copy()
+    values[column] = share * DRIVE.damping_N_s_per_m
+    begun = base_start(of.drive, replace(found, values=values))
+
+    assert begun["damping_N_s_per_m"] == pytest.approx(start * DRIVE.damping_N_s_per_m)
+    assert begun["mass_kg"] == DRIVE.mass_kg
+
+
+@pytest.mark.parametrize(("times", "is_bent"), [(1.9, False), (2.1, True), (0.4, True)])
+def test_an_effect_of_the_simulation_is_bent_beyond_a_factor_of_two(times, is_bent):
+    of = problem(recordings(COULOMB)[:2], effects=COULOMB)
+    found = fit(of)
+    column = [one.parameter for one in found.names].index("force_N")
+    values = found.values.copy()
+    values[column] = times * 0.8
+
+    assert bends_effects(of.drive, replace(found, values=values)) == is_bent

@@ -70,6 +70,16 @@ def test_starts_are_ordered_by_how_near_they_come():
     assert [one["force_N"] for one in starts] == pytest.approx([0.8, 0.2])
 
 
+def test_of_a_limit_every_start_that_cuts_is_kept():
+    """Beside a base that is off, or in a loop, no forecast knows which one is near."""
+    at_base = linearised("input_saturation")
+    starts = forecast(at_base, "input_saturation").starts
+    assert sorted(one["limit_A"] for one in starts) == pytest.approx(
+        [0.6, 1.2, 2.0, 2.8, 3.52]
+    )
+    assert starts[0]["limit_A"] == pytest.approx(2.8)
+
+
 def test_the_base_absorbs_its_own_directions():
     at_base = linearised("coulomb_friction")
     np.testing.assert_allclose(
