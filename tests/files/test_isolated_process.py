@@ -50,7 +50,8 @@ def endless(tmp_path):
 
 def request(path):
     columns = {"time": "t", "input": "u", "output": "y"}
-    return {"folder": "", "path": str(path), "columns": columns}
+    roles = list(columns)
+    return {"folder": "", "path": str(path), "columns": columns, "roles": roles}
 
 
 def process_of(reader):
