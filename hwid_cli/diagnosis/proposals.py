@@ -108,7 +108,7 @@ class Proposals:
                 replace(begin, effects={**begin.effects, one.effect: values})
                 for begin, starts in (
                     (from_fit, one.starts),
-                    (stated, _first(one, n_stated)),
+                    (stated, first_starts(one, n_stated)),
                 )
                 for values in starts
             ]
@@ -161,7 +161,7 @@ class Proposals:
             yield with_effect((first,), second), SearchStart(base, {**present, **both})
 
 
-def _first(found: Forecast, count: int) -> Sequence[dict[str, float]]:
+def first_starts(found: Forecast, count: int) -> Sequence[dict[str, float]]:
     """So many starts of an effect; of a limit all, which no forecast can rank."""
     is_limit = count > 0 and CATALOGUE[found.effect].strongest.off == inf
     return found.starts if is_limit else found.starts[:count]

@@ -214,3 +214,14 @@ def test_a_base_that_is_stuck_is_fitted_from_where_an_effect_has_led_it(monkeypa
     assert found.verdict.word == "parameters"
     assert found.base.whiteness <= 1.0
     assert friction_of(found.base) == FRICTION
+
+
+@pytest.mark.thorough
+def test_a_base_beside_what_is_missing_stays():
+    """Without the effect that is missing the base leaves what it left before."""
+    given = problem(recordings({"coulomb_friction": {"force_N": 0.8}}))
+    fitted = base_fit.fitted_base(given)
+    with_it = fit(given, {"coulomb_friction": {"force_N": 0.8}})
+
+    assert with_it.sse.sum() < 0.1 * fitted.base.sse.sum()
+    assert base_fit.fitted_from(fitted, with_it) is None

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from hwid_cli.diagnosis import rounds
 from hwid_cli.diagnosis.candidate import Screened
 from hwid_cli.diagnosis.few_samples import first_parts
-from hwid_cli.diagnosis.proposals import SCREENED_ON_TOP
+from hwid_cli.diagnosis.forecast import Forecast
+from hwid_cli.diagnosis.proposals import SCREENED_ON_TOP, first_starts
 from hwid_cli.diagnosis.rounds import FEWEST_FINISHED, MOST_FINISHED, run_rounds
 from hwid_cli.diagnosis.set_fits import SetFits
 from hwid_cli.drive.catalogue import CATALOGUE
@@ -306,3 +308,20 @@ def test_nothing_is_built_on_what_ran_to_its_bound(monkeypatch):
     assert search.parents(1) == [best, one]
     monkeypatch.setattr(rounds, "runs_to_bound", lambda _, found, scales: found is best)
     assert search.parents(1) == [one]
+
+
+@pytest.mark.parametrize(
+    ("effect", "count", "kept"),
+    [
+        ("coulomb_friction", 1, 1),
+        ("coulomb_friction", 0, 0),
+        ("input_saturation", 1, 4),
+        ("input_saturation", 0, 0),
+    ],
+)
+def test_beside_what_is_stated_a_limit_has_all_its_starts(effect, count, kept):
+    """A limit of 20 V in a loop was found from the fourth of its starts alone."""
+    found = Forecast(
+        effect, 0.5, tuple({"value": float(n)} for n in range(4)), np.ones(3)
+    )
+    assert list(first_starts(found, count)) == list(found.starts[:kept])
