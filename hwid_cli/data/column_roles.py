@@ -228,7 +228,7 @@ def _clock_of(column: FoundColumn) -> signs.Clock | None:
         return clock
     if begins := signs.restarts_of(column.values):
         return signs.clock_of(column.values[: begins[0]])
-    return signs.uneven_clock_of(column.values)
+    return signs.clock_of(column.values, may_be_uneven=True)
 
 
 def _is_in_time(column: FoundColumn) -> bool:

@@ -52,12 +52,14 @@ class Clock:
     jitter: float
 
 
-def clock_of(values: np.ndarray) -> Clock | None:
+def clock_of(values: np.ndarray, *, may_be_uneven: bool = False) -> Clock | None:
     """Clock that a column may be.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
+    may_be_uneven : bool
+        Whether it may grow however unevenly: stamps of events.
 
     Returns
     -------
@@ -70,39 +72,16 @@ def clock_of(values: np.ndarray) -> Clock | None:
     Clock(step=0.5, jitter=0.0)
     >>> clock_of(np.arange(100.0) ** 2) is None
     True
-    """
-    steps = _growing_steps(values)
-    if steps is None:
-        return None
-    median = float(np.median(steps))
-    off = np.abs(steps - median) / median
-    if np.mean(off > MOST_JITTER) > MOST_GAPS:
-        return None
-    return Clock(median, float(off.max()))
-
-
-def uneven_clock_of(values: np.ndarray) -> Clock | None:
-    """Clock of a column that grows, however unevenly: stamps of events.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-
-    Returns
-    -------
-    Clock or None
-        None for a column that does not grow throughout.
-
-    Examples
-    --------
-    >>> uneven_clock_of(np.cumsum(np.tile([1.0, 2.0, 5.0], 20))).step
+    >>> clock_of(np.cumsum(np.tile([1.0, 2.0, 5.0], 20)), may_be_uneven=True).step
     2.0
     """
     steps = _growing_steps(values)
     if steps is None:
         return None
     median = float(np.median(steps))
-    return Clock(median, float(np.max(np.abs(steps - median)) / median))
+    off = np.abs(steps - median) / median
+    is_even = np.mean(off > MOST_JITTER) <= MOST_GAPS
+    return Clock(median, float(off.max())) if is_even or may_be_uneven else None
 
 
 def _growing_steps(values: np.ndarray) -> np.ndarray | None:

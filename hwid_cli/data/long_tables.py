@@ -60,6 +60,8 @@ class LongTable:
         Of the recording; empty where a file holds one.
     clock : str
         Name of the column of times.
+    unit : str
+        Of the clock; empty where nothing says it.
     signals : mapping of str to tuple of two ndarray, shape (n_own,)
         Stamps, [unit of the clock], and values, by name.
     """
@@ -91,9 +93,16 @@ class LongTable:
         for name in [one for one in stamps if one not in alike]:
             times, values = self.signals[name]
             order = np.argsort(times, kind="stable")
-            found[f"{self.clock} of {name}"] = times[order]
+            found[self._own_clock(name)] = times[order]
             found[name] = values[order]
         return found
+
+    def is_clock(self, column: str) -> bool:
+        """Whether a column is that of times, or a signal's own one."""
+        return column in (self.clock, *map(self._own_clock, self.signals))
+
+    def _own_clock(self, name: str) -> str:
+        return f"{self.clock} of {name}"
 
 
 def _share_in(stamps: np.ndarray, others: np.ndarray) -> float:
@@ -157,6 +166,7 @@ def long_tables(
         if telling
         else [""] * names.size
     )
+    unit = time.unit or unit_in_name(clock, "time")
     tables = []
     for label in dict.fromkeys(labels.tolist()):
         signals = {}
@@ -165,7 +175,7 @@ def long_tables(
             if rows.any() and is_plain(name) and name:
                 signals[name] = (time.values[rows], value.values[rows])
         if len(signals) >= _FEWEST_NAMES:
-            tables.append(LongTable(label, clock, time.unit, signals))
+            tables.append(LongTable(label, clock, unit, signals))
     return tuple(tables)
 
 
@@ -187,7 +197,7 @@ def columns_of_long(tables: Sequence[LongTable]) -> tuple[FoundColumn, ...]:
             name,
             values,
             table.name or None,
-            table.unit if name.startswith(table.clock) else "",
+            table.unit if table.is_clock(name) else "",
         )
         for table in tables
         for name, values in table.columns.items()
@@ -234,9 +244,8 @@ def pick_from_long(
                 f"{place}: has no signal {key!r} for the {role}; "
                 f"{did_you_mean(str(key), list(there))}"
             )
-        is_clock = str(key).startswith(table.clock)
         named = unit_in_name(str(key), "output" if role == "reference" else role)
-        unit = table.unit if is_clock and table.unit else named
+        unit = table.unit if table.is_clock(str(key)) else named
         said_by = f"the name {key!r}" if unit else ""
         title = f"{role} {key!r}"
         found.append(

@@ -67,3 +67,26 @@ def test_a_table_whose_head_names_what_is_asked_for_is_no_long_one(tmp_path):
     read = dict(read_csv_columns(path, Columns(input="u", output="value", time="time")))
 
     np.testing.assert_allclose(read["output"].values, Y)
+
+
+def test_a_unit_of_the_clock_is_not_that_of_a_signal_whose_name_begins_alike(tmp_path):
+    """A clock t beside a torque, each signal with stamps of its own."""
+    lines = ["t [ms];channel;value"]
+    for shift, name, values in ((0.0, "torque [N m]", U), (0.3, "theta [deg]", Y)):
+        lines += [
+            f"{1e3 * k + shift};{name};{v!r}" for k, v in enumerate(values.tolist())
+        ]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(lines) + "\n")
+    clock = "t [ms] of theta [deg]"
+    wanted = Columns(
+        input="torque [N m]", output="theta [deg]", time="t [ms]", output_time=clock
+    )
+    read = {role: one.unit for role, one in read_csv_columns(path, wanted)}
+
+    assert {one.key: one.unit for one in list_csv_columns(path)} == {
+        "t [ms]": "ms", "torque [N m]": "", clock: "ms", "theta [deg]": "",
+    }  # fmt: skip
+    assert read == {
+        "time": "ms", "input": "N m", "output": "deg", "output_time": "ms",
+    }  # fmt: skip
