@@ -42,7 +42,7 @@ from hwid_cli.diagnosis.search import (
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
-from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.diagnosis import STILL_LARGE, NoiseFloor
 from hwid_cli.records.drive import BASE_AND_MASS, Drive
 
@@ -573,6 +573,14 @@ def without_base(found: CandidateFit) -> CandidateFit:
     is_kept = np.array([one.owner != BASE for one in found.names], dtype=bool)
     names = tuple(one for one in found.names if one.owner != BASE)
     return replace(found, names=names, values=found.values[is_kept])
+
+
+def with_values(
+    found: CandidateFit, values: Mapping[ParameterRef, float]
+) -> CandidateFit:
+    """The fit with other values of some of its shared parameters."""
+    pairs = zip(found.names, found.values.tolist(), strict=True)
+    return replace(found, values=np.array([values.get(*pair) for pair in pairs]))
 
 
 def without_starts(found: CandidateFit) -> CandidateFit:

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from hwid_cli.diagnosis.problem import Signals
-from hwid_cli.diagnosis.simulator import DIFFERENCE
+from hwid_cli.diagnosis.simulator import CLEARLY_WIDER, DIFFERENCE, difference_for
 from hwid_cli.records.programs import FreeParameter, SimulatorRun
 
 # Evaluations of a search; it goes on, so many times at most, where the last few of them
@@ -57,6 +57,22 @@ def fit_parameters(
     return gap.at(start)
 
 
+def cost_of(ask: Ask, signals: Sequence[Signals], values: Mapping[str, float]) -> float:
+    """Sum of squares that runs leave; infinite where one gives no answer."""
+    found = ask(signals, values)
+    if found is None:
+        return float("inf")
+    errors = _errors(signals, found)
+    return float(errors @ errors)
+
+
+def _errors(signals: Sequence[Signals], found: Sequence[SimulatorRun]) -> np.ndarray:
+    pairs = zip(signals, found, strict=True)
+    return np.concatenate(
+        [(one.compared - run.output)[one.evaluated] for one, run in pairs]
+    )
+
+
 class _Gap:
     """What a simulation leaves of recordings, by its parameters over their sizes.
 
@@ -82,6 +98,7 @@ class _Gap:
         self._costs: list[float] = []
         # A search that goes on begins where its last part has been.
         self._asked: dict[bytes, np.ndarray] = {}
+        self._slopes: dict[int, np.ndarray] = {}
         self._sloped: tuple[bytes, np.ndarray] | None = None
 
     @property
@@ -114,22 +131,32 @@ class _Gap:
 
     def _differences(self, coordinates: np.ndarray) -> np.ndarray:
         here = self.errors(coordinates)
+        rms = float(np.sqrt(np.mean(here**2)))
         columns = []
         for column in range(coordinates.size):
-            moved = coordinates.copy()
-            is_inside = moved[column] + DIFFERENCE <= self._high[column]
-            step = DIFFERENCE if is_inside else -DIFFERENCE
-            moved[column] += step
-            slope = (self._left(moved) - here) / step
+            last = self._slopes.get(column)
+            step = DIFFERENCE if last is None else difference_for(last, rms)
+            slope = self._difference(coordinates, here, column, step)
+            wanted = difference_for(slope, rms)
+            if last is None and wanted > CLEARLY_WIDER * step:
+                slope = self._difference(coordinates, here, column, wanted)
             # At the edge of what it can be run with, a parameter stays.
-            columns.append(slope if np.isfinite(slope).all() else np.zeros(here.size))
+            slope = slope if np.isfinite(slope).all() else np.zeros(here.size)
+            self._slopes[column] = slope
+            columns.append(slope)
         return np.column_stack(columns)
+
+    def _difference(
+        self, coordinates: np.ndarray, here: np.ndarray, column: int, step: float
+    ) -> np.ndarray:
+        moved = coordinates.copy()
+        is_inside = moved[column] + step <= self._high[column]
+        moved[column] += step if is_inside else -step
+        change = self._left(moved) - here
+        return np.asarray(change / (step if is_inside else -step))
 
     def _left(self, coordinates: np.ndarray) -> np.ndarray:
         found = self._ask(self._signals, self.at(coordinates))
         if found is None:
             return np.full(self._size, np.inf)
-        pairs = zip(self._signals, found, strict=True)
-        return np.concatenate(
-            [(one.compared - run.output)[one.evaluated] for one, run in pairs]
-        )
+        return _errors(self._signals, found)

@@ -136,16 +136,38 @@ def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
         )
 
     values = fit_parameters(ask, problem.signals, runs.simulator.free, turn.values)
-    given, found = runs.tried(problem.signals, values), ask(problem.signals, values)
+    each = [forces[one.name] for one in problem.signals]
+    there = begun_with(turn, runs, values, each)
+    return replace(turn, problem=held(problem)) if there is None else there
+
+
+def begun_with(
+    turn: Turn,
+    runs: Runs,
+    values: dict[str, float],
+    forces: Sequence[np.ndarray],
+) -> Turn | None:
+    """A first turn with given parameters of the simulation and the forces of its effects.
+
+    None where the simulation gives no answer there.
+
+    Parameters
+    ----------
+    forces : sequence of ndarray, shape (n_samples,), [N]
+        For each recording, what the effects of the turn's fit make.
+    """
+    problem = turn.problem
+    given = runs.tried(problem.signals, values)
+    found = pushed(runs, problem, forces, turn.at_force, values)
     if given is None or found is None:
-        return replace(turn, problem=held(problem))
+        return None
     standing = standing_beside(runs, problem, given, values)
     signals = tuple(
-        _standing_with(standing.drive, one, run, forces[one.name])
-        for one, run in zip(standing.signals, found, strict=True)
+        _standing_with(standing.drive, one, run, force)
+        for one, run, force in zip(standing.signals, found, forces, strict=True)
     )
     there = held(replace(standing, signals=signals))
-    fit = where_it_starts(there, without_base(fit))
+    fit = where_it_starts(there, without_base(turn.fit))
     return Turn(there, fit, values, turn.said, turn.at_force, rival=turn.rival)
 
 

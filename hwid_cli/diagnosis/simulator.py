@@ -19,8 +19,37 @@ from hwid_cli.records.programs import (
 )
 
 # Derivatives by its parameters, as a share of their size: its integrator may be no more
-# exact than a millionth.
+# exact than a millionth. At most so much more where that changes less than this share of
+# what is left: an integrator of less accuracy would be all of it.
 DIFFERENCE = 1e-3
+_MOST_WIDER = 50.0
+_LEAST_CHANGE = 0.1
+# A difference that should be wider by more than this is taken again.
+CLEARLY_WIDER = 2.0
+
+
+def difference_for(slope: np.ndarray, errors_rms: float) -> float:
+    """Width of a difference that tells a derivative, as a share of the parameter's size.
+
+    Parameters
+    ----------
+    slope : ndarray, shape (n_samples,), [output unit]
+        What a parameter changes over the share of its size by which it was changed; not
+        finite where a run gave no answer.
+    errors_rms : float, [output unit]
+        What the derivative is used on.
+
+    Returns
+    -------
+    float, [-]
+        At least ``DIFFERENCE``.
+    """
+    size = float(np.sqrt(np.mean(slope**2)))
+    if not np.isfinite(size):
+        return DIFFERENCE
+    most = _MOST_WIDER * DIFFERENCE
+    least = _LEAST_CHANGE * errors_rms
+    return float(np.clip(least / size, DIFFERENCE, most)) if size > 0 else most
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.input_effects import with_input_effect
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED,
@@ -102,6 +103,12 @@ def single_in_simulation(
     for turn in _twins_in_simulation(findings, runs, tried, fits):
         fit = fit_of_run(findings, turn)
         tried[fit.effects], fits[fit.effects] = turn, fit
+    on_input = _on_input_through_runs(findings, runs, values, likely, fits)
+    for turn in on_input:
+        fit = fit_of_run(findings, turn)
+        before = fits.get(fit.effects)
+        if before is None or fit.sse.sum() < before.sse.sum():
+            tried[fit.effects], fits[fit.effects] = turn, fit
     decided = _decided(findings, tried, fits)
     if decided is not None:
         told, moved = decided
@@ -134,6 +141,39 @@ def _twins_in_simulation(
             if twin.effects not in done:
                 found.append(settled(findings, twin, runs, turn.values_of_run))
     return [turn for turn in found if turn is not None]
+
+
+def _on_input_through_runs(
+    findings: Findings,
+    runs: Runs,
+    values: dict[str, float],
+    likely: Sequence[CandidateFit],
+    fits: Mapping[tuple[str, ...], CandidateFit],
+) -> list[Turn]:
+    """Effects on the input, fitted with the simulation's parameters, where nothing is enough.
+
+    Those whose runs have left least come first, until one leaves nothing more.
+    """
+    criteria = findings.criteria
+    if not runs.simulator.free or any(
+        criteria.is_nearly_all(one, findings.base) for one in fits.values()
+    ):
+        return []
+
+    def left(one: CandidateFit) -> float:
+        return float(fits.get(one.effects, one).sse.sum())
+
+    found: list[Turn] = []
+    on_input = [one for one in likely if changes_input(one.effects)]
+    for one in sorted(on_input, key=left)[:_MOST_ON_INPUT]:
+        if runs.run_tasks.are_spent:
+            break
+        turn = with_input_effect(findings, one, runs, values)
+        if turn is not None:
+            found.append(turn)
+            if criteria.is_complete(fit_of_run(findings, turn)):
+                break
+    return found
 
 
 def _twins(findings: Findings, fit: CandidateFit) -> list[CandidateFit]:

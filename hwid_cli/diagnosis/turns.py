@@ -31,7 +31,7 @@ from hwid_cli.diagnosis.parameters import (
     simulate_at,
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs
+from hwid_cli.diagnosis.simulator import CLEARLY_WIDER, DIFFERENCE, Runs, difference_for
 from hwid_cli.diagnosis.stand_in import (
     act_as_forces,
     corrected,
@@ -41,7 +41,7 @@ from hwid_cli.diagnosis.stand_in import (
 from hwid_cli.drive.simulation import Motion, drive_effects
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.drive import BASE_PARAMETERS
-from hwid_cli.records.programs import SimulatorRun
+from hwid_cli.records.programs import FreeParameter, SimulatorRun
 
 # Runs with the effect, and the share of what remains (or of the noise) by which loop and
 # simulation may differ.
@@ -252,7 +252,8 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
     if not problem.known:
         return replace(following, fit=fitted_again(corrected, fit, findings))
     if not turn.slopes or have_moved(turn.slopes_at, turn.values, _SAME_SLOPES):
-        slopes = tuple(_slopes(runs, push, turn.values, found))
+        rms = findings.criteria.noise.rms
+        slopes = tuple(_slopes(runs, push, turn.values, found, rms))
         following = replace(following, slopes=slopes, slopes_at=turn.values)
     return _with_values(following, (found, forces), runs, findings)
 
@@ -375,23 +376,48 @@ def _slopes(
     push: Callable[[dict[str, float]], list[SimulatorRun] | None],
     values: dict[str, float],
     found: Sequence[SimulatorRun],
+    noise_rms: float,
 ) -> list[np.ndarray]:
     """Derivatives of each recording's output by the simulation's free parameters.
+
+    Parameters
+    ----------
+    noise_rms : float, [output unit]
+        Which a difference has to be seen beside.
 
     Returns
     -------
     list of ndarray, shape (n_samples, n_free)
     """
-    columns: list[list[np.ndarray]] = [[] for _ in found]
-    for name, one in runs.simulator.free.items():
-        step = DIFFERENCE * (abs(values[name]) or abs(one.value) or 1.0)
+    free = runs.simulator.free.items()
+    each = [_slope(push, values, (name, one), found, noise_rms) for name, one in free]
+    return [
+        np.column_stack([slope[row] for slope in each]) for row in range(len(found))
+    ]
+
+
+def _slope(
+    push: Callable[[dict[str, float]], list[SimulatorRun] | None],
+    values: dict[str, float],
+    parameter: tuple[str, FreeParameter],
+    found: Sequence[SimulatorRun],
+    noise_rms: float,
+) -> list[np.ndarray]:
+    """Derivatives by one parameter; zeros where no run is possible with more of it."""
+    name, one = parameter
+    size = abs(values[name]) or abs(one.value) or 1.0
+
+    def slope(share: float) -> list[np.ndarray]:
+        step = share * size
         if values[name] + step > one.limits[1]:
             step = -step
-        # Where it cannot be run with more of a parameter, that one stays.
         there = push({**values, name: values[name] + step}) or found
-        for row, (after, before) in enumerate(zip(there, found, strict=True)):
-            columns[row].append((after.output - before.output) / step)
-    return [np.column_stack(one) for one in columns]
+        pairs = zip(there, found, strict=True)
+        return [(after.output - before.output) / step for after, before in pairs]
+
+    slopes = slope(DIFFERENCE)
+    wanted = difference_for(np.concatenate(slopes) * size, noise_rms)
+    return slope(wanted) if wanted > CLEARLY_WIDER * DIFFERENCE else slopes
 
 
 def pushed(

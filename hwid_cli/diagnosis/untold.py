@@ -17,7 +17,7 @@ from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import QUANTILE
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs
+from hwid_cli.diagnosis.simulator import CLEARLY_WIDER, DIFFERENCE, Runs, difference_for
 from hwid_cli.diagnosis.turns import acts_at_force, forces_along, pushed
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.diagnosis import BaseParameter, FittedEffect, Law
@@ -279,12 +279,19 @@ class _Moving:
         """Derivatives by the logarithms; shape (n_evaluated, n)."""
         columns = []
         for column in range(self.size):
-            logs = np.zeros(self.size)
-            logs[column] = DIFFERENCE
-            if self.leaves(logs):
-                logs[column] = -DIFFERENCE
-            after = self.errors(logs)
-            # Where it cannot be run with more of a parameter, that one stays.
-            moved = before if after is None else after
-            columns.append((moved - before) / logs[column])
+            slope = self._slope(before, column, DIFFERENCE)
+            wanted = difference_for(slope, errors_rms=1.0)
+            if wanted > CLEARLY_WIDER * DIFFERENCE:
+                slope = self._slope(before, column, wanted)
+            columns.append(slope)
         return np.column_stack(columns)
+
+    def _slope(self, before: np.ndarray, column: int, width: float) -> np.ndarray:
+        logs = np.zeros(self.size)
+        logs[column] = width
+        if self.leaves(logs):
+            logs[column] = -width
+        after = self.errors(logs)
+        # Where it cannot be run with more of a parameter, that one stays.
+        moved = before if after is None else after
+        return np.asarray((moved - before) / logs[column])

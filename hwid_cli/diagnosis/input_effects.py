@@ -1,0 +1,146 @@
+"""Effects on the input alone, fitted through the simulation's own runs.
+
+They need no loop: a run with the changed input is exact. Parameters of the simulation that
+have imitated a delay leave a second minimum, which no turn leaves; so effect and parameters
+are fitted together, from the parameters as stated too. docs/method_diagnosis.md, eq. (D32b).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import rebuilt, with_values, without_base
+from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.own_parameters import cost_of, fit_parameters
+from hwid_cli.diagnosis.parameters import simulate_at
+from hwid_cli.diagnosis.problem import Signals
+from hwid_cli.diagnosis.settling import begun_with
+from hwid_cli.diagnosis.simulator import Runs
+from hwid_cli.diagnosis.turns import Turn, best_turn, forces_along, held, pushed
+from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.records.candidates import CandidateFit, ParameterRef
+from hwid_cli.records.programs import FreeParameter, SimulatorRun
+
+
+def with_input_effect(
+    findings: Findings, fit: CandidateFit, runs: Runs, values: dict[str, float]
+) -> Turn | None:
+    """Best run with an effect on the input, fitted together with the parameters.
+
+    Parameters
+    ----------
+    fit : CandidateFit
+        Of one effect on the input to the stand-in.
+    values : dict of str to float
+        Parameters of the simulation as they were fitted without it.
+
+    Returns
+    -------
+    Turn or None
+        None where the simulation gives no answer, or what it leaves is not less than
+        without the effect.
+    """
+    search = _Search(findings, without_base(fit), runs)
+    best = search.best_of(search.starts(values))
+    if best is None:
+        return None
+    found = fit_parameters(search.ask, findings.problem.signals, search.free, best)
+    begun = search.begun(found)
+    turn = None if begun is None else best_turn(findings, begun, runs)
+    if turn is None or turn.tried is None:
+        return None
+    return None if turn.sse.sum() >= findings.base.sse.sum() else turn
+
+
+class _Search:
+    """An effect on the input and the simulation's parameters as one set of values.
+
+    Parameters
+    ----------
+    fit : CandidateFit
+        Of the effect alone.
+    """
+
+    def __init__(self, findings: Findings, fit: CandidateFit, runs: Runs) -> None:
+        self._findings, self._fit, self._runs = findings, fit, runs
+        self._problem = held(findings.problem)
+        (self._effect,) = fit.effects
+        fitted = dict(zip(fit.names, fit.values.tolist(), strict=True))
+        self._of_effect = {
+            str(ref): value
+            for ref, value in fitted.items()
+            if ref.owner == self._effect
+        }
+
+    @property
+    def free(self) -> dict[str, FreeParameter]:
+        """Parameters of the simulation and of the effect, with their bounds."""
+        scales = self._findings.scales
+        bounds = {
+            name: CATALOGUE[self._effect].parameter(_name(name)).bounds(scales)
+            for name in self._of_effect
+        }
+        effect = {
+            name: FreeParameter(value, bounds[name])
+            for name, value in self._of_effect.items()
+        }
+        return {**self._runs.simulator.free, **effect}
+
+    def starts(self, values: Mapping[str, float]) -> list[dict[str, float]]:
+        """Where to begin: parameters as fitted and as stated, effects as found and of any size."""
+        effect = CATALOGUE[self._effect].starts(self._findings.scales)
+        names = self._of_effect
+        sizes = [{name: one[_name(name)] for name in names} for one in effect]
+        stated = self._runs.simulator.values
+        return [{**of, **size} for of in (values, stated) for size in (names, *sizes)]
+
+    def best_of(self, starts: Sequence[dict[str, float]]) -> dict[str, float] | None:
+        """The start that leaves least of the training recording that moves most."""
+        train = [one for one in self._problem.signals if not one.is_held_out]
+        largest = max(train, key=lambda one: float(np.ptp(one.compared)))
+        costs = [cost_of(self.ask, [largest], one) for one in starts]
+        best = int(np.argmin(costs))
+        return starts[best] if np.isfinite(costs[best]) else None
+
+    def ask(
+        self, signals: Sequence[Signals], values: Mapping[str, float]
+    ) -> list[SimulatorRun] | None:
+        """Run the simulation with its input as the effect changes it."""
+        forces = self._forces(values)
+        if forces is None:
+            return None
+        rows = {one.name: row for row, one in enumerate(self._problem.signals)}
+        chosen = [forces[rows[one.name]] for one in signals]
+        some = replace(self._problem, signals=tuple(signals))
+        return pushed(self._runs, some, chosen, False, self._of_simulation(values))
+
+    def begun(self, values: Mapping[str, float]) -> Turn | None:
+        """A first turn from these values."""
+        forces = self._forces(values)
+        if forces is None:
+            return None
+        said = float(self._fit.sse.sum())
+        fit = with_values(self._fit, _by_ref(values, self._of_effect))
+        own = self._of_simulation(values)
+        turn = Turn(self._problem, fit, own, said, at_force=False)
+        return begun_with(turn, self._runs, own, forces)
+
+    def _forces(self, values: Mapping[str, float]) -> list[np.ndarray] | None:
+        fit = with_values(self._fit, _by_ref(values, self._of_effect))
+        point = rebuilt(self._problem, fit, self._findings.scales)
+        forces = forces_along(self._problem, simulate_at(self._problem, *point))
+        return forces if all(np.isfinite(one).all() for one in forces) else None
+
+    def _of_simulation(self, values: Mapping[str, float]) -> dict[str, float]:
+        return {k: v for k, v in values.items() if k not in self._of_effect}
+
+
+def _name(key: str) -> str:
+    return ParameterRef.of_text(key).parameter
+
+
+def _by_ref(
+    values: Mapping[str, float], keys: Mapping[str, float]
+) -> dict[ParameterRef, float]:
+    return {ParameterRef.of_text(key): values[key] for key in keys}
