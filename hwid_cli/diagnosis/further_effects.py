@@ -2,7 +2,7 @@
 
 A stand-in errs by more than a small effect where the simulation is not linear. Corrected
 by the run with the first effect in it, it tells a second one, which is put into the
-simulation beside the first. docs/method_diagnosis.md, eq. (D32a).
+simulation beside the first. docs/method_diagnosis.md, eq. (D32b).
 """
 
 from dataclasses import replace

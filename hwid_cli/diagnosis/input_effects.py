@@ -2,7 +2,7 @@
 
 They need no loop: a run with the changed input is exact. Parameters of the simulation that
 have imitated a delay leave a second minimum, which no turn leaves; so effect and parameters
-are fitted together, from the parameters as stated too. docs/method_diagnosis.md, eq. (D32b).
+are fitted together, from the parameters as stated too. docs/method_diagnosis.md, eq. (D32c).
 """
 
 from collections.abc import Mapping, Sequence

@@ -41,6 +41,8 @@ _LEAST_LEFT = 0.01
 # of them leaves at most.
 _MOST_ON_INPUT = 3
 _CLEARLY_LESS = 0.5
+# Squares over the least, from which on an effect is no rival of what leaves hardly anything.
+_NEAR = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,19 +154,24 @@ def _on_input_through_runs(
 ) -> list[Turn]:
     """Effects on the input, fitted with the simulation's parameters, where nothing is enough.
 
-    Those whose runs have left least come first, until one leaves nothing more.
+    Those that have left least come first, until one leaves nothing more.
     """
-    criteria = findings.criteria
-    if not runs.simulator.free or any(
-        criteria.is_nearly_all(one, findings.base) for one in fits.values()
-    ):
+    criteria, base = findings.criteria, findings.base
+    done = fits.values()
+    if not runs.simulator.free or any(criteria.is_complete(one) for one in done):
         return []
 
     def left(one: CandidateFit) -> float:
-        return float(fits.get(one.effects, one).sse.sum())
+        # A run that leaves more than the stand-in has said has not settled.
+        return float(min(one.sse.sum(), fits.get(one.effects, one).sse.sum()))
 
+    # Beside what leaves hardly anything only another one that does so counts.
+    is_nearly_all = any(criteria.is_nearly_all(one, base) for one in done)
+    most = _NEAR * min(one.sse.sum() for one in done) if is_nearly_all else np.inf
     found: list[Turn] = []
-    on_input = [one for one in likely if changes_input(one.effects)]
+    on_input = [
+        one for one in likely if changes_input(one.effects) and left(one) <= most
+    ]
     for one in sorted(on_input, key=left)[:_MOST_ON_INPUT]:
         if runs.run_tasks.are_spent:
             break
