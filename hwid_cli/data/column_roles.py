@@ -17,6 +17,7 @@ from hwid_cli.data.column_words import (
     OF_UNIT,
     Meaning,
     counts_recordings,
+    may_drive,
     meaning_of,
     place_in_chain,
 )
@@ -48,6 +49,8 @@ FEWEST_SAMPLES = 60
 _CLEAR = 0.3
 # Beyond this the numbers speak against the names, [-].
 _AGAINST = -0.6
+_ANSWERS = "by its content: it answers to the input"
+_IS_ANSWERED = "by its content: the output answers to it"
 # How much being smoother than the input counts beside the answer to it, [-].
 _SMOOTHER = 0.25
 # Columns that are compared with each other: more are no measurement of one drive.
@@ -105,20 +108,35 @@ class SignalGuess:
 
 @dataclass(frozen=True)
 class _Named:
-    """A column with what its name and unit say."""
+    """A column with what its name and unit say.
+
+    Parameters
+    ----------
+    others : tuple of ndarray, shape (n_samples,)
+        The same column in further recordings.
+    """
 
     column: FoundColumn
     meaning: Meaning
+    others: tuple[np.ndarray, ...] = ()
 
     @property
     def values(self) -> np.ndarray:
         """Its numbers, with straight lines over those that are missing."""
-        values = self.column.values
-        known = np.isfinite(values)
-        if known.all():
-            return values
-        every = np.arange(values.size)
-        return np.interp(every, every[known], values[known])
+        return _bridged(self.column.values)
+
+    @property
+    def recordings(self) -> tuple[np.ndarray, ...]:
+        """Its numbers in every recording."""
+        return (self.values, *map(_bridged, self.others))
+
+
+def _bridged(values: np.ndarray) -> np.ndarray:
+    known = np.isfinite(values)
+    if known.all() or not known.any():
+        return values
+    every = np.arange(values.size)
+    return np.interp(every, every[known], values[known])
 
 
 def long_columns(columns: Sequence[FoundColumn]) -> list[FoundColumn]:
@@ -287,13 +305,18 @@ def _slow_note(step_s: float) -> tuple[str, ...]:
     )
 
 
-def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
+def guess_signals(
+    columns: Sequence[FoundColumn], others: Sequence[Sequence[FoundColumn]] = ()
+) -> SignalGuess:
     """Find input, output and, where there is one, the reference.
 
     Parameters
     ----------
     columns : sequence of FoundColumn
         All of the file.
+    others : sequence of sequence of FoundColumn
+        Of further recordings of the same kind: which signal answers to which may show in
+        some of them only.
 
     Raises
     ------
@@ -307,7 +330,8 @@ def guess_signals(columns: Sequence[FoundColumn]) -> SignalGuess:
             if signs.changes(one.values)
             and _clock_of(one) is None
             and not (counts_recordings(one.title) and signs.blocks_of(one.values))
-        ]
+        ],
+        others,
     )
     able = [one for one in named if one.meaning.role not in ("time", "counter")]
     if len(named) < 2 or not able:
@@ -353,9 +377,19 @@ def _too_few(count: int, columns: Sequence[FoundColumn]) -> MeasurementError:
     )
 
 
-def _with_meanings(columns: Sequence[FoundColumn]) -> list[_Named]:
+def _with_meanings(
+    columns: Sequence[FoundColumn], others: Sequence[Sequence[FoundColumn]]
+) -> list[_Named]:
     """Columns with their meanings; a role that all of them have tells nothing."""
-    named = [_Named(one, meaning_of(one.title, one.unit)) for one in columns]
+    further = [{one.place: one.values for one in other} for other in others]
+    named = [
+        _Named(
+            one,
+            meaning_of(one.title, one.unit),
+            tuple(other[one.place] for other in further if one.place in other),
+        )
+        for one in columns
+    ]
     by_unit = [one for one in named if one.meaning.role and not _is_worded(one)]
     roles = {one.meaning.role for one in by_unit}
     if len(by_unit) > 1 and len(roles) == 1 and len(by_unit) == len(named):
@@ -397,14 +431,18 @@ def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
     free = [one for one in named if not one.meaning.role]
     if inputs and free:
         last = max(free, key=lambda one: _answer(inputs[0], one))
-        why = "by its content: it answers to the input"
-        return inputs[0], last, {"input": _by(inputs[0]), "output": why}
+        reasons = {"input": _by(inputs[0]), "output": _ANSWERS}
+        # A unit may be that of a sensor's signal.
+        is_sure = _is_worded(inputs[0])
+        return _as_they_answer((inputs[0], last), reasons, is_sure=is_sure)
     if outputs:
         others = free or [one for one in named if one not in outputs] or outputs[1:]
         first = max(others, key=lambda one: _answer(one, outputs[0]))
         last, why = _chosen_output(first, [one for one in outputs if one != first])
-        what = "by its content: the output answers to it"
-        return first, last, {"input": what, "output": why}
+        is_sure = not may_drive(last.meaning)
+        return _as_they_answer(
+            (first, last), {"input": _IS_ANSWERED, "output": why}, is_sure=is_sure
+        )
     if inputs:
         found = _along_chain(inputs)
         if found is not None:
@@ -416,6 +454,22 @@ def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
     return _by_content(pool)
 
 
+def _as_they_answer(
+    pair: tuple[_Named, _Named], reasons: dict[str, str], *, is_sure: bool
+) -> tuple[_Named, _Named, dict[str, str]]:
+    """Input and output, exchanged where the numbers speak against a name that says little.
+
+    Parameters
+    ----------
+    is_sure : bool
+        Whether one of the two names leaves no doubt.
+    """
+    first, last = pair
+    if is_sure or _answer(first, last) > _AGAINST:
+        return first, last, reasons
+    return last, first, {"input": _IS_ANSWERED, "output": _ANSWERS}
+
+
 def _by(one: _Named) -> str:
     return "by its name" if _is_worded(one) else f"by its unit, {one.meaning.unit}"
 
@@ -424,7 +478,9 @@ def _answer(first: _Named, last: _Named) -> float:
     """How clearly one answers to another; multiples of each other do not."""
     if signs.are_same(first.values, last.values):
         return -2.0
-    return signs.answers(first.values, last.values)
+    pairs = zip(first.recordings, last.recordings, strict=False)
+    # One whose input repeats itself, as a multisine, is predicted either way.
+    return float(np.median([signs.answers(*pair) for pair in pairs]))
 
 
 def _chosen_input(inputs: list[_Named], last: _Named) -> tuple[_Named, str]:
@@ -481,11 +537,8 @@ def _by_content(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
         return _answer(*pair) + _SMOOTHER * smoother
 
     first, last = max(pairs, key=worth)
-    reasons = {
-        "input": "by its content: other columns answer to it",
-        "output": "by its content: it answers to the input",
-    }
-    return first, last, reasons
+    what = "by its content: other columns answer to it"
+    return first, last, {"input": what, "output": _ANSWERS}
 
 
 def _current_of_twins(

@@ -52,6 +52,8 @@ _INPUT = [
     "uq",
     "ua",
     "ia",
+    *("heater", "heating", "heiz", "throttle", "drossel", "blower", "laser", "led"),
+    *("power", "leistung"),
 ]
 _OUTPUT = [
     "displacement",
@@ -104,7 +106,23 @@ _OUTPUT = [
     "resolver",
     "tacho",
     "lvdt",
+    *(
+        "contraction",
+        "elongation",
+        "extension",
+        "strain",
+        "dehnung",
+        "flow",
+        "durchfluss",
+    ),
+    *("thermocouple", "thermoelement", "photodiode", "detector", "microphone", "sound"),
+    *("concentration", "konzentration", "height"),
 ]
+# Outputs that may drive something else as well, as a fan's speed does a pressure.
+_MAY_DRIVE = {
+    *("speed", "velocity", "vel", "geschwindigkeit", "drehzahl", "rpm", "pressure"),
+    *("druck", "flow", "durchfluss", "temperature", "temperatur", "temp"),
+}
 # Rank of a role that no word tells, but the unit.
 OF_UNIT = 99
 # Of several outputs these are hardly ever meant: how warm a machine is, how it shakes.
@@ -117,7 +135,10 @@ _HARDLY_MEANT = [
     "temp",
 ]
 # Words that say that something was measured: another word, or the unit, says what.
-_MEASURED = ["measured", "measurement", "istwert", "fb", "feedback"]
+_MEASURED = [
+    *("measured", "measurement", "istwert", "fb", "feedback"),
+    *("transmitter", "sensor", "probe"),
+]
 _TIME = [
     *("time", "zeit", "t", "timestamp", "tijd", "secs", "seconds", "sekunden", "sec"),
     "stamp",
@@ -303,6 +324,19 @@ def counts_recordings(title: str) -> bool:
     (True, True, False)
     """
     return any(word in _RECORDINGS for word in _words(title))
+
+
+def may_drive(meaning: Meaning) -> bool:
+    """Whether a name of an output is one of an input as often.
+
+    Examples
+    --------
+    >>> may_drive(meaning_of("pressure_kPa")), may_drive(meaning_of("position_mm"))
+    (True, False)
+    """
+    if meaning.role != "output" or meaning.rank == OF_UNIT:
+        return False
+    return meaning.rank > OF_UNIT or _OUTPUT[meaning.rank] in _MAY_DRIVE
 
 
 def _role_of_unit(unit: str) -> str:

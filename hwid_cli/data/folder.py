@@ -39,6 +39,8 @@ from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
 # Beyond this share of samples that are missing a signal is slower than its rows, [-].
 _MOST_LOST = 0.05
 _SLOW = -1
+# Further files that are asked which signal answers to which.
+_MOST_ASKED = 7
 # Stands for every table of a file, and how deep these may lie.
 STAR = "*"
 _DEEPEST_TABLE = 3
@@ -266,7 +268,8 @@ def _typical(alike: Sequence[FoundFile]) -> tuple[FoundFile, SignalGuess]:
     fault = ""
     for file in (*whole, *others):
         try:
-            return file, guess_signals(_table(file))
+            further = [_table(one) for one in whole if one is not file]
+            return file, guess_signals(_table(file), further[:_MOST_ASKED])
         except MeasurementError as error:
             fault = fault or f"{escaped(file.name)}: {error}"
     more = f" (nor do the other {len(alike) - 1} files)" * (len(alike) > 1)

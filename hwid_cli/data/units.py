@@ -315,8 +315,18 @@ _SUFFIXES = {
         *("m", "mm", "cm", "um", "µm", "rad", "mrad", "deg"),
         *("s", "ms", "us", "µs", "rpm", "bar", "mbar", "Pa", "hPa", "kPa", "MPa", "K"),
         *("m/s", "mm/s", "rad/s", "deg/s", "1/s", "1/min", "m/s^2"),
+        *("W", "kW", "Hz", "kHz", "degC", "l/min", "L/min", "ml/min", "l/h"),
     ]
 } | {
+    "lpm": "l/min",
+    "l_min": "l/min",
+    "ml_min": "ml/min",
+    "mmps": "mm/s",
+    "mps": "m/s",
+    "radps": "rad/s",
+    "degps": "deg/s",
+    "pct": "%",
+    "percent": "%",
     "rad_s": "rad/s",
     "m_s": "m/s",
     "mm_s": "mm/s",
@@ -365,12 +375,18 @@ _MEASURED_IN = {
     "V": ("u", "uq", "ud"),
     "N": ("f",),
     "m": ("x", "y", "z", "s", "l", "h"),
+    "W": ("p",),
 }
 
 
-# A column of time may be named by its unit alone.
+# Behind a name of time alone: elsewhere "min" is the least of something, "h" an index.
+_LONG_TIMES = re.compile(
+    r"(?:.*(?:time|zeit|elapsed)|t)_(?:(min)(?:utes|uten|s)?|(h)(?:ours?|rs?)?|(d)(?:ays?)?)",
+    re.IGNORECASE,
+)
 # What ticks, in front of what it counts from.
 _TICKS_IN_FRONT = re.compile(r"(ms|us|ns)(?=[_ ])", re.IGNORECASE)
+# A column of time may be named by its unit alone.
 _NAMES_OF_TIME = {
     **{unit: unit for unit in ("ms", "us", "µs", "ns", "sec", "msec")},
     "millis": "ms",
@@ -432,12 +448,12 @@ def unit_in_name(title: str, role: str) -> str:
     ('', 'A')
     >>> unit_in_name("ms_today", "time"), unit_in_name("ms_today", "output")
     ('ms', '')
+    >>> unit_in_name("time_min", "time"), unit_in_name("t_min", "output")
+    ('min', '')
     """
     bare, unit = split_unit(title)
-    if role == "time" and title.strip() in _NAMES_OF_TIME:
-        return _NAMES_OF_TIME[title.strip()]
-    if role == "time" and (first := _TICKS_IN_FRONT.match(title.strip())):
-        return first[1].lower()
+    if role == "time" and (named := _unit_of_time(title.strip())):
+        return named
     if not unit:
         return ""
     bracket = _BRACKET.search(title)
@@ -458,6 +474,16 @@ def unit_in_name(title: str, role: str) -> str:
     if len(unit) == 1 and symbol and _SYMBOLS.fullmatch(symbol):
         return unit if symbol in _MEASURED_IN.get(unit, ()) else ""
     return unit
+
+
+def _unit_of_time(title: str) -> str:
+    """Unit that the name of a column of time says in ways that no other one does."""
+    if title in _NAMES_OF_TIME:
+        return _NAMES_OF_TIME[title]
+    if long := _LONG_TIMES.fullmatch(title):
+        return next(one for one in long.groups() if one).lower()
+    first = _TICKS_IN_FRONT.match(title)
+    return first[1].lower() if first else ""
 
 
 def looks_like_unit(text: str) -> bool:

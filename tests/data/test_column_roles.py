@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.data.column_roles import guess_signals, guess_time, unused_times
+from hwid_cli.data.units import unit_in_name
 from hwid_cli.records.starter import FoundColumn
 
 N = 800
@@ -313,3 +314,73 @@ def test_both_ends_of_a_circuit_are_told(units, said):
     notes = [one for one in found.notes if "may be the input as well" in one]
     assert (found.input.key, bool(notes)) == ("I_mot", said is not None)
     assert said is None or (said in notes[0] and "{input: 'U_mot'}" in notes[0])
+
+
+def levels_and_answer(seed):
+    """Held levels, and what follows them slowly with noise; a sine tells neither way."""
+    rng = np.random.default_rng(seed)
+    level = np.repeat(rng.uniform(1.2, 3.0, N // 40), 40)
+    return level, slow(level) + 1e-3 * rng.standard_normal(N)
+
+
+def slow(u):
+    x = np.full(u.size, u[0])
+    for k in range(1, u.size):
+        x[k] = 0.9 * x[k - 1] + 0.1 * u[k - 1]
+    return x
+
+
+def test_what_drives_shows_in_some_of_the_recordings_only():
+    sine = 2.0 + np.sin(2 * np.pi * np.arange(N) / 50)
+    titles = ("pressure", "foo")
+
+    def table(u, y):
+        return [column(*one) for one in zip(titles, (u, y), strict=True)]
+
+    # A sine without noise is predicted either way, and then the name says the output.
+    first = table(sine, slow(sine))
+    alone = guess_signals(first)
+    assert alone.input.key == "foo"
+    assert any("NOT SURE" in note for note in alone.notes)
+    others = [table(*levels_and_answer(seed)) for seed in (1, 2, 3)]
+    found = guess_signals(first, others)
+    assert (found.input.key, found.output.key) == ("pressure", "foo")
+    assert not any("NOT SURE" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("driving", "answering"),
+    [
+        ("pressure_Pa", "contraction_mm"),
+        ("fan_speed_rpm", "pressure_Pa"),
+        ("foo_mV", "bar"),
+        ("bar", "foo_mV"),
+        ("heater_pct", "thermocouple_mV"),
+    ],
+)
+def test_names_that_say_little_give_way_to_what_answers(driving, answering):
+    u, y = levels_and_answer(4)
+    first, last, found = guessed((answering, y), (driving, u))
+    assert (first, last) == (driving, answering)
+    assert not any("NOT SURE" in note for note in found.notes)
+
+
+def test_a_position_stays_the_output_whatever_the_numbers_say():
+    # A controller makes the input from it.
+    u, y = levels_and_answer(5)
+    first, last, found = guessed(("position_mm", u), ("foo", y))
+    assert (first, last) == ("foo", "position_mm")
+    assert any("NOT SURE" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("title", "unit"), [("time_min", "min"), ("t_h", "h"), ("Zeit_min", "min")]
+)
+def test_minutes_and_hours_behind_a_name_of_time(title, unit):
+    ticks = 0.5 * np.arange(100)
+    guess = guess_time([column(title, ticks), column("u", np.sin(ticks))])
+    assert guess.role.unit == unit
+
+
+def test_the_least_of_something_is_no_time():
+    assert unit_in_name("speed_min", "time") == ""
