@@ -575,6 +575,21 @@ def without_base(found: CandidateFit) -> CandidateFit:
     return replace(found, names=names, values=found.values[is_kept])
 
 
+def without_owner(found: CandidateFit, effect: str) -> CandidateFit:
+    """The fit without one of its effects; the values of the others stay."""
+    kept = np.array([one.owner != effect for one in found.names], dtype=bool)
+    own = np.array([one.owner != effect for one in found.own_names], dtype=bool)
+    return replace(
+        found,
+        effects=tuple(one for one in found.effects if one != effect),
+        names=tuple(one for one in found.names if one.owner != effect),
+        values=found.values[kept],
+        own_names=tuple(one for one in found.own_names if one.owner != effect),
+        own=found.own[:, own],
+        valleys=found.valleys[:, kept] if found.valleys.size else found.valleys,
+    )
+
+
 def with_values(
     found: CandidateFit, values: Mapping[ParameterRef, float]
 ) -> CandidateFit:

@@ -5,11 +5,15 @@ docs/method_diagnosis.md, eq. (D32), (D33).
 
 from dataclasses import replace
 
+from hwid_cli.diagnosis.candidate import rebuilt, without_owner
 from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.parameters import residuals_at, sum_of_squares
+from hwid_cli.diagnosis.selection import LEAST_LAST_CONTRIBUTION
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.turns import Turn, fit_of_run, is_as_good
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 
 
 def confirm(
@@ -40,6 +44,7 @@ def confirm(
     best = settled(findings, chosen, runs, values)
     if best is None:
         return unconfirmed(findings), values, False
+    best = _without_idle(findings, best, runs)
     found, criteria = _with_run(findings, best), findings.criteria
     run = found.verdict.chosen
     is_enough = is_as_good(best) or criteria.is_nearly_all(run, findings.base)
@@ -47,6 +52,45 @@ def confirm(
     if is_enough and may_be_named:
         return found, best.values_of_run, True
     return unconfirmed(findings), best.values_of_run, False
+
+
+def _without_idle(findings: Findings, best: Turn, runs: Runs) -> Turn:
+    """The run without effects that hardly act in it, if it leaves hardly more.
+
+    They have made up for what the stand-in erred by before runs corrected it.
+    """
+    criteria = findings.criteria
+    slight = LEAST_LAST_CONTRIBUTION * criteria.excess(findings.base)
+    run = fit_of_run(findings, best)
+    for effect in run.effects:
+        if len(run.effects) < 2 or not _may_go(effect, run.effects):
+            continue
+        if _acts_by(findings, best, effect) > slight or runs.run_tasks.are_spent:
+            continue
+        beside = replace(findings, problem=replace(best.problem, known={}))
+        smaller = without_owner(run, effect)
+        turn = settled(beside, smaller, runs, best.values_of_run)
+        if turn is None:
+            continue
+        fit = fit_of_run(findings, turn)
+        is_as_complete = criteria.is_complete(fit) or not criteria.is_complete(run)
+        if is_as_complete and criteria.excess(fit) <= criteria.excess(run) + slight:
+            best, run = turn, fit
+    return best
+
+
+def _may_go(effect: str, effects: tuple[str, ...]) -> bool:
+    """Whether no second one of its kind would stay behind."""
+    return all(CATALOGUE[one].beside != public_id(effect) for one in effects)
+
+
+def _acts_by(findings: Findings, turn: Turn, effect: str) -> float:
+    """Squares by which an effect of a fit moves the stand-in, as it was corrected last."""
+    parts = [
+        residuals_at(turn.problem, *rebuilt(turn.problem, fit, findings.scales))
+        for fit in (turn.fit, without_owner(turn.fit, effect))
+    ]
+    return sum_of_squares([one - other for one, other in zip(*parts, strict=True)])
 
 
 def unconfirmed(findings: Findings) -> Findings:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
+import scipy
 
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
 from hwid_cli.diagnosis.whiteness import (
@@ -26,8 +27,9 @@ from hwid_cli.trust.repeats import is_same_input
 
 FEWEST_AT_REST = 30
 _FEWEST_RESTS = 3
-# What a motion that all rests begin with leaves of them is less than this share, [-].
-_LEFT_OF_COMMON = 0.3
+# What a motion that all rests begin with leaves of them is less than this share, and noise
+# shows as much in common with less than this probability, [-].
+_LEFT_OF_COMMON, _BY_CHANCE = 0.7, 1e-4
 # Orders of differences: the second where the first still sees motion or colour.
 _ORDER, _HIGHER_ORDER = 6, 16
 _SEES_MOTION = 0.7
@@ -371,7 +373,8 @@ def _from_rest(all_signals: Sequence[Signals], may_move: bool) -> Stretch | None
 def _without_common_motion(pieces: list[np.ndarray]) -> list[np.ndarray]:
     """Pieces without the motion that all of them begin with, as when a brake lets go.
 
-    Noise differs from recording to recording: less than this share of it would be left.
+    Noise differs from recording to recording, and has as large a mean over them once in
+    very many cases only (an F test with its independent values).
     """
     length, count = min(piece.size for piece in pieces), len(pieces)
     cut = [piece[:length] for piece in pieces]
@@ -380,7 +383,25 @@ def _without_common_motion(pieces: list[np.ndarray]) -> list[np.ndarray]:
     alone = [np.sqrt(count / (count - 1)) * (piece - common) for piece in cut]
     left = pooled_rms([one - one.mean() for one in alone])
     whole = pooled_rms([one - one.mean() for one in cut])
-    return alone if left < _LEFT_OF_COMMON * whole else pieces
+    if left >= _LEFT_OF_COMMON * whole:
+        return pieces
+    ratio = count * float(np.var(common)) / max(left**2, np.finfo(float).tiny)
+    free = _independent_values(alone)
+    chance = scipy.stats.f.sf(ratio, free, free * (count - 1))
+    return alone if chance < _BY_CHANCE else pieces
+
+
+def _independent_values(pieces: list[np.ndarray]) -> float:
+    """How many independent values a piece of coloured noise is worth; at least one."""
+    length = pieces[0].size
+    size = 2 * length
+    power = np.mean(
+        [np.abs(np.fft.rfft(one - one.mean(), size)) ** 2 for one in pieces], axis=0
+    )
+    correlation = np.fft.irfft(power, size)[:length]
+    if correlation[0] <= 0:
+        return float(length)
+    return max(length / float(2 * np.sum((correlation / correlation[0]) ** 2) - 1), 1.0)
 
 
 def _stretch(own: list[np.ndarray], around: list[np.ndarray]) -> Stretch:

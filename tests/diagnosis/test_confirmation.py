@@ -30,6 +30,7 @@ def test_two_that_look_alike_are_no_fact_where_its_run_leaves_something(
     turn = SimpleNamespace(values_of_run={})
     monkeypatch.setattr(confirmation, "settled", lambda *_: turn)
     monkeypatch.setattr(confirmation, "is_as_good", lambda _: True)
+    monkeypatch.setattr(confirmation, "_without_idle", lambda _, best, __: best)
     monkeypatch.setattr(
         confirmation,
         "_with_run",
@@ -68,3 +69,41 @@ def test_what_was_told_to_be_noise_is_noise_where_the_run_leaves_no_more(
     verdict = confirmation._with_run(findings, turn).verdict
     assert verdict.chosen.cause == cause
     assert verdict.is_complete is bool(cause)
+
+
+@pytest.mark.parametrize(
+    ("acts_by", "left_without", "remain"),
+    [
+        # A run leaves as much without it.
+        (10.0, 101.0, ("coulomb_friction",)),
+        # The simulation's own run misses it, or it acts.
+        (10.0, 3000.0, ("coulomb_friction", "periodic_force")),
+        (9000.0, 101.0, ("coulomb_friction", "periodic_force")),
+    ],
+)
+def test_what_hardly_acts_in_the_run_is_no_effect(
+    monkeypatch, acts_by, left_without, remain
+):
+    pair, whole = ("coulomb_friction", "periodic_force"), base(600_000.0)
+    findings = Findings(
+        problem=None, criteria=CRITERIA, scales=None, given_sse=whole.sse, base=whole,
+        before=[], force=[], where=(), found=None,
+        verdict=DiagnosisVerdict("named", True, made_up(pair, 100.0), ()),
+    )  # fmt: skip
+    runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
+    problem = DiagnosisProblem((), StandIn(1.0, 1.0, 1.0, 1.0))
+
+    def turn_of(fit):
+        return SimpleNamespace(fit=fit, problem=problem, values_of_run={})
+
+    def settled(_findings, fit, _runs, _values):
+        return turn_of(replace(fit, sse=made_up(fit.effects, left_without).sse))
+
+    def acts(_findings, _turn, effect):
+        return acts_by if effect == "periodic_force" else 1e5
+
+    monkeypatch.setattr(confirmation, "settled", settled)
+    monkeypatch.setattr(confirmation, "fit_of_run", lambda _, turn: turn.fit)
+    monkeypatch.setattr(confirmation, "_acts_by", acts)
+    found = confirmation._without_idle(findings, turn_of(made_up(pair, 100.0)), runs)
+    assert found.fit.effects == remain
