@@ -12,6 +12,8 @@ References
 docs/method.md, eqs. (35)-(36). Ljung (1999), sections 4.2 and 10.6 (subspace methods).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 
@@ -20,7 +22,7 @@ from hwid_cli.records.recordings import Recording
 
 # Past outputs, and past inputs beyond the delays that are tried; fewer where the
 # recording is short.
-_ORDER, _MOST_DELAY, _SAMPLES_PER_COEFFICIENT = 16, 20, 8
+_ORDER, MOST_DELAY, _SAMPLES_PER_COEFFICIENT = 16, 20, 8
 # Noise that signals are taken to have at least, as a share of their size.
 _LEAST_NOISE = 1e-4
 # Chance of taking a coefficient of the noise for an answer.
@@ -41,7 +43,7 @@ def estimate_response(recording: Recording) -> ResponseEstimate:
     """
     order = min(
         _ORDER,
-        (recording.n_samples // _SAMPLES_PER_COEFFICIENT - _MOST_DELAY) // 2,
+        (recording.n_samples // _SAMPLES_PER_COEFFICIENT - MOST_DELAY) // 2,
     )
     nothing = ResponseEstimate(recording.name, -1, np.zeros(0), 0)
     if order < 1:
@@ -61,10 +63,22 @@ def estimate_response(recording: Recording) -> ResponseEstimate:
     return ResponseEstimate(recording.name, delay, values, _count_poles(values))
 
 
+def longest_delay(responses: Sequence[ResponseEstimate]) -> int:
+    """Longest delay that three quarters of the recordings do not contradict.
+
+    Returns
+    -------
+    int, [samples]
+        -1 where no output answers its input.
+    """
+    found = [one.delay for one in responses if one.delay >= 0]
+    return int(np.quantile(found, 0.25, method="inverted_cdf")) if found else -1
+
+
 def _arx_equations(recording: Recording, order: int) -> tuple[np.ndarray, np.ndarray]:
     """Columns: a constant, past outputs, inputs from the oldest to the newest."""
     u, y = recording.input, recording.output
-    longest = order + _MOST_DELAY
+    longest = order + MOST_DELAY
     rows = np.arange(longest, y.size)
     columns = [np.ones(rows.size)]
     columns += [y[rows - lag] / np.std(y) for lag in range(1, order + 1)]
@@ -81,7 +95,7 @@ def _arx_equations(recording: Recording, order: int) -> tuple[np.ndarray, np.nda
 def _delay(shares: np.ndarray, residual: float, freedom: int) -> int:
     """Most of the newest inputs that the output does without; -1 if all of them."""
     newest_first = shares[::-1] ** 2
-    gains = np.cumsum(newest_first[: _MOST_DELAY + 1])
+    gains = np.cumsum(newest_first[: MOST_DELAY + 1])
     counts = np.arange(1, gains.size + 1)
     noise = residual / freedom
     if noise == 0.0:

@@ -111,6 +111,9 @@ class OrderAdvice:
         Of the output.
     tried_delays : tuple of int, [samples]
         Delays of which every fit takes the best; empty where the grid says the delay.
+    further_delays : tuple of int, [samples]
+        For ``fit.delays``, where recordings allow a longer one than the grid reaches, and
+        models that may take it are better; empty elsewhere.
     """
 
     overall: OrderChoice
@@ -125,6 +128,7 @@ class OrderAdvice:
     nf: int | None
     unit: str
     tried_delays: tuple[int, ...] = ()
+    further_delays: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from hwid_cli.records.next import NextRecordings
 from hwid_cli.records.order import MapAdvice, OrderAdvice
 from hwid_cli.report.formats import counted, listed, with_unit
 from hwid_cli.report.map_words import fit_keys, map_words
-from hwid_cli.report.orders import axes_to_widen, delay_keys, delays_to_try
+from hwid_cli.report.orders import axes_to_widen, delay_keys
 
 # Room for the words on the left, [characters].
 _LABELS = 12
@@ -185,9 +185,9 @@ def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
     if maps is not None and maps.chosen != maps.given:
         said += f": put {fit_keys(maps.chosen)} into fit"
     axes = axes_to_widen(orders, orders.overall.nb, orders.overall.nk)
-    if delays := delays_to_try(orders):
+    if delays := orders.further_delays:
         said += (
-            f"; the recordings allow a delay of up to {delays[-1]} samples, which these "
+            f"; models are better with a delay of up to {delays[-1]} samples, which these "
             f"orders do not reach: put {delay_keys(delays)} into fit"
         )
     elif axes:

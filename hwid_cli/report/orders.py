@@ -227,17 +227,6 @@ def axes_to_widen(advice: OrderAdvice, nb: int, nk: int) -> list[str]:
     ]
 
 
-def delays_to_try(advice: OrderAdvice) -> tuple[int, ...]:
-    """Delays for ``fit.delays``, where recordings allow a longer one than the grid reaches.
-
-    Leading coefficients of B make up for some samples, so the grid reaches as far as nb.
-    """
-    reach = _GRID_DELAY + max(advice.nb)
-    if advice.nk_role == "delay" or advice.tried_delays or advice.delay <= reach:
-        return ()
-    return (_GRID_DELAY, (_GRID_DELAY + advice.delay) // 2, advice.delay)
-
-
 def _edges(advice: OrderAdvice) -> str:
     axes = axes_to_widen(advice, advice.overall.best_nb, advice.overall.best_nk)
     if not axes:
@@ -268,10 +257,13 @@ def _delays(advice: OrderAdvice) -> str:
             f" The grid takes {_GRID_DELAY}; leading coefficients of B make up for more, "
             f"up to {_GRID_DELAY + max(advice.nb)}."
         )
-    if tried := delays_to_try(advice):
+    if tried := advice.further_delays:
         text += (
-            f" Put {delay_keys(tried)} into fit, and every fit takes the best of them."
+            f" Put {delay_keys(tried)} into fit, and every fit takes the best of them: "
+            "models are better so."
         )
+    elif advice.delay > _GRID_DELAY + max(advice.nb):
+        text += " Models that may take a longer one are no better."
     if advice.delay < _GRID_DELAY:
         text += f" The grid takes {_GRID_DELAY}: set orders.nk_role: delay to try 0."
     return text

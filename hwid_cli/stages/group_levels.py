@@ -37,7 +37,7 @@ from hwid_cli.tasks.cache import model_key, recording_key, task_key
 from hwid_cli.tasks.runner import Task, TaskDone
 
 NAME = "group"
-STAGE_VERSION = 16
+STAGE_VERSION = 17
 
 # Does the work of a level with what runs its tasks. The text says what they are, "fits",
 # "pairs" or "models", the second number how many there will be.

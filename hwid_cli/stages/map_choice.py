@@ -121,7 +121,7 @@ def recommend_maps(
     ----------
     docs/method.md, section "Which maps".
     """
-    rmsd, n_outliers = _validation_rmsd(fits, recordings, validation, settings)
+    rmsd, n_outliers = validation_rmsd(fits, recordings, validation, settings)
     found = scored(
         rmsd,
         [one.name for one in recordings],
@@ -158,7 +158,7 @@ def recommend_maps(
     )
 
 
-def _validation_rmsd(
+def validation_rmsd(
     fits: Sequence[Sequence[Fit]],
     recordings: Sequence[Recording],
     validation: Sequence[Recording],

@@ -6,22 +6,23 @@ docs/method.md, eqs. (33)-(36).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from hwid_cli.errors import CacheError, ConfigError
-from hwid_cli.model.response_estimate import estimate_response
+from hwid_cli.model.response_estimate import estimate_response, longest_delay
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import Experiment, OrderOptions, OrdersOptions
-from hwid_cli.records.model import Fit
+from hwid_cli.records.model import Fit, Orders
 from hwid_cli.records.order import MapAdvice, OrderAdvice, OrderChoice
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
 from hwid_cli.report.orders import map_reasons, map_table, order_reasons, order_table
 from hwid_cli.report.table import Block
 from hwid_cli.stages.candidate_selection import ScoredCandidates, scored, smallest_good
+from hwid_cli.stages.delay_choice import are_delays_needed, further_delays
 from hwid_cli.stages.fit_seconds import FIT_BYTES, counted, map_seconds
 from hwid_cli.stages.identify import recordings_with_models
 from hwid_cli.stages.map_choice import candidate_maps, fit_maps, recommend_maps
@@ -85,7 +86,7 @@ def recommend_orders(
             if found is not None
         ),
         responses=responses,
-        delay=_quantile([one.delay for one in responses if one.delay >= 0], 0.25, -1),
+        delay=longest_delay(responses),
         n_poles=_quantile([one.n_poles for one in responses if one.n_poles], 0.5, 0),
         tolerance=options.tolerance,
         nb=crossval.nb,
@@ -94,6 +95,7 @@ def recommend_orders(
         nf=orders.nf,
         unit=crossval.unit,
         tried_delays=fits[0].options.delays,
+        further_delays=further_delays(responses, orders, fits[0].options),
     )
 
 
@@ -258,6 +260,7 @@ def _compute(given: _Given, runner: Runner) -> Advice:
             f"{experiment.source}: orders: no validation recording has a usable model; expected "
             "at least one RMSD; widen the orders or change fit"
         )
+    orders = _with_needed_delays(given, orders, runner)
     return Advice(orders, _recommend_maps(given, orders, runner))
 
 
@@ -276,6 +279,31 @@ def _without_outliers(
         )
 
 
+def _with_needed_delays(
+    given: _Given, advice: OrderAdvice, runner: Runner
+) -> OrderAdvice:
+    """The advice without longer delays that models are no better with."""
+    if not advice.further_delays:
+        return advice
+    crossval = given.crossval
+    chosen = given.named(crossval.identified_on)
+    validation = given.named(crossval.validated_on)
+    options = given.experiment.fit, advice.further_delays
+    total = 2 * len(chosen) * (1 + len(validation))
+    with runner.tasks(total, "fits and pairs", part="delays") as settings:
+        orders = _orders_at(given, advice)
+        if are_delays_needed(chosen, validation, orders, options, settings):
+            return advice
+    return replace(advice, further_delays=())
+
+
+def _orders_at(given: _Given, advice: OrderAdvice) -> Orders:
+    """The recommended orders."""
+    place = advice.overall.nb, advice.overall.nk
+    grid = candidate_orders(given.experiment.orders)
+    return next(one for nb, nk, one in grid if (nb, nk) == place)
+
+
 def _recommend_maps(
     given: _Given, advice: OrderAdvice, runner: Runner
 ) -> MapAdvice | None:
@@ -286,9 +314,7 @@ def _recommend_maps(
         return None
     chosen = given.named(crossval.identified_on)
     validation = given.named(crossval.validated_on)
-    place = advice.overall.nb, advice.overall.nk
-    grid = candidate_orders(experiment.orders)
-    orders = next(one for nb, nk, one in grid if (nb, nk) == place)
+    orders = _orders_at(given, advice)
     with runner.tasks(len(chosen) * len(candidates), "fits", part="maps") as settings:
         fits = fit_maps(chosen, orders, candidates, settings)
     rounds = 1 if experiment.fit.loss == "squared" else 1 + ROUNDS

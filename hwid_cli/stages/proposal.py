@@ -278,13 +278,11 @@ def _with_common_level(
         kind: tuple(step for step in recipe if step != "output_offset")
         for kind, recipe in recipes.items()
     }
+    if rests_at_operating_points(own):
+        reason = "; the level at which the output rests goes with the input, and stays"
+        return kept, reason
     if len(own) == len(raws):
-        if not rests_at_operating_points(raws):
-            return recipes, ""
-        return (
-            kept,
-            "; the level at which the output rests goes with the input, and stays",
-        )
+        return recipes, ""
     swing = swing_of([raw.output for raw in raws])
     levels = np.array([rest_level(raw) for raw in own])
     is_common = np.ptp(levels) <= ALIKE_LEVELS * swing

@@ -2,8 +2,8 @@
 
 Few recordings are worth most together: each visits another part of what a model has to say.
 With all of them in one fit none is left to choose by. So each is left out in turn, and the
-maps and orders are taken that come closest to what was left out: first the kinds of maps,
-then their size, then the orders. The model itself is fitted to all of them.
+maps and orders are taken that come closest to what was left out: first whether a longer
+delay is needed, then the kinds of maps, their size, and the orders. The model itself is fitted to all of them.
 
 References
 ----------
@@ -17,12 +17,14 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.model.fit import fit, fit_without_standard_errors
+from hwid_cli.model.response_estimate import MOST_DELAY, estimate_response
 from hwid_cli.model.scores import rmsd
 from hwid_cli.model.simulate import estimated_state, simulate, validation_output
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.maps import MAP_KINDS
 from hwid_cli.records.model import Fit, FitOptions, Orders
 from hwid_cli.records.recordings import Recording
+from hwid_cli.stages.delay_choice import WORTH_A_DELAY, further_delays
 from hwid_cli.stages.identify import STAGE_VERSION, Run
 from hwid_cli.stages.order_grid import candidate_orders
 from hwid_cli.tasks.cache import recording_key, task_key
@@ -157,11 +159,12 @@ def most_fits(options: FitOptions, n_recordings: int, n_orders: int) -> int:
     Examples
     --------
     >>> most_fits(FitOptions(), n_recordings=4, n_orders=12)
-    77
+    102
     """
     candidates = len(_USUAL) * len(kinds_tried(options)) + 2 + n_orders
-    # The best maps were fitted at one pair of orders before.
-    return (candidates - 1) * len(folds_of(n_recordings)) + 1
+    # The best maps were fitted at one pair of orders before; a longer delay is a candidate
+    # more, and each is tried by a fit of all recordings.
+    return candidates * len(folds_of(n_recordings)) + 1 + MOST_DELAY + 1
 
 
 def fit_together(
@@ -181,6 +184,10 @@ def fit_together(
     """
     orders = candidate_orders(grid)
     folds = _Folds(recordings, run)
+    responses = [estimate_response(one) for one in recordings]
+    if delays := further_delays(responses, grid, options):
+        plain = Candidate(with_units(options, _FEWEST_UNITS), *_typical(orders)[0])
+        options = replace(options, delays=folds.delays_needed(plain, delays))
     kinds = [with_units(one, _FEWEST_UNITS) for one in kinds_tried(options)]
     best = folds.best_of(
         [Candidate(one, *at) for one in kinds for at in _typical(orders)]
@@ -249,6 +256,31 @@ class _Folds:
             pool, least = settling, nearest
         near = [one for one in pool if off[one] <= least + np.log1p(_AS_CLOSE)]
         return min(near, key=lambda one: (one.size, off[one]))
+
+    def delays_needed(
+        self, plain: Candidate, delays: tuple[int, ...]
+    ) -> tuple[int, ...]:
+        """Of longer delays those that recordings ask for; none where they do not.
+
+        Of few recordings, what the maps know of a left out one decides more than a delay
+        does. So a model of all of them has to fit clearly better, and what is left out
+        must not speak against it. Each delay has a fit of its own: the starts of a fit
+        that may take several know nothing of its maps yet.
+        """
+        late = [
+            replace(plain, options=replace(plain.options, delays=(one,)))
+            for one in delays
+        ]
+        found = self._fits([self._task(one, ()) for one in (plain, *late)])
+        without, *bics = (one.information.bic for one in found)
+        least = int(np.argmin(np.nan_to_num(bics, nan=np.inf)))
+        if not bics[least] < without - WORTH_A_DELAY or least == 0:
+            return ()
+        compared = (late[least], plain)
+        self.best_of(compared)
+        off = [self._off(self._fits_of[one], is_of_motion=True) for one in compared]
+        # Further coefficients reach beyond it.
+        return delays[least - 1 : least + 1] if off[0] <= off[1] else ()
 
     def fitted(self, candidates: Sequence[Candidate]) -> tuple[Candidate, Fit]:
         """The best candidate, fitted to all recordings with standard errors.

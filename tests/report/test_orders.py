@@ -10,7 +10,7 @@ from hwid_cli.records.order import (
     SelectionEvidence,
 )
 from hwid_cli.report.closing import orders_sentence
-from hwid_cli.report.orders import delays_to_try, order_reasons, order_table
+from hwid_cli.report.orders import order_reasons, order_table
 from hwid_cli.report.simulation_note import simulation_note
 from hwid_cli.report.table import as_text
 
@@ -157,21 +157,10 @@ def test_outliers_that_do_not_count_are_told(count, words):
     assert "outlier" not in said()
 
 
-@pytest.mark.parametrize(
-    ("changes", "delays"),
-    [
-        # Four coefficients reach a delay of five samples.
-        ({"delay": 16}, (1, 8, 16)),
-        ({"delay": 6}, (1, 3, 6)),
-        ({"delay": 5}, ()),
-        ({"delay": -1}, ()),
-        ({"delay": 16, "tried_delays": (1, 8)}, ()),
-        ({"delay": 16, "nk_role": "delay"}, ()),
-    ],
-)
-def test_a_delay_that_the_grid_does_not_reach_is_said_with_its_key(changes, delays):
+@pytest.mark.parametrize("delays", [(1, 2, 3, 4, 5, 6), ()])
+def test_a_delay_that_the_grid_does_not_reach_is_said_with_its_key(delays):
+    changes = {"further_delays": delays}
     advice = replace(ADVICE, **changes)
-    assert delays_to_try(advice) == delays
     key = f"put delays: [{', '.join(map(str, delays))}] into fit"
     assert (key in orders_sentence(advice, None)) == bool(delays)
     assert (key.capitalize() in said(**changes)) == bool(delays)

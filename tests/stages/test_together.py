@@ -310,3 +310,32 @@ def test_of_what_is_nearly_as_close_the_smallest_is_taken(monkeypatch, off, is_s
     monkeypatch.setattr(together, "_share_off", share_off)
     best = together._Folds(STEPS, None).best_of([large, small])
     assert best == (small if is_small else large)
+
+
+def late_probe(u, delay):
+    """A warm body behind a transport, read by a probe that bends."""
+    late = np.r_[np.full(delay, u[0]), u[: u.size - delay]]
+    block = lfilter([0.1], [1, -0.9], late - u[0]) + u[0]
+    body = lfilter([0.04], [1, -0.96], block - u[0]) + u[0]
+    return body + 0.3 * body**2
+
+
+def levels(name, seed, delay):
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(0.2, 2.0, 6), 50)
+    noise = 0.01 * rng.standard_normal(u.size)
+    return Recording(name, u, late_probe(u, delay) + noise, 1.0)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("delay", [0, 9])
+def test_a_longer_delay_is_taken_where_recordings_ask_for_it(delay):
+    recordings = [levels("a", 1, delay), levels("b", 2, delay), levels("c", 3, delay)]
+    grid = OrdersOptions(nb=(1, 2), nk=(1, 2))
+    whole = fit_together(recordings, grid, OPTIONS, Count()).fit
+    assert bool(whole.options.delays) == bool(delay)
+    # The first coefficients of the numerator may be small.
+    assert abs(whole.orders.nk - (delay or 1)) <= 1
+    new = levels("new", 9, delay)
+    left = new.output - simulate(whole.model, new.input)
+    assert np.sqrt(np.mean(left[50:] ** 2)) < 0.03
