@@ -42,7 +42,7 @@ from hwid_cli.tasks.cache import model_key, recording_key, task_key
 from hwid_cli.tasks.runner import RunSettings, Task, run_tasks
 
 NAME = "crossval"
-STAGE_VERSION = 3
+STAGE_VERSION = 4
 
 # Widest models whose bands are told.
 _BANDS = 3

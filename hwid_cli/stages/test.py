@@ -59,7 +59,7 @@ from hwid_cli.trust.input_distance import input_distances
 from hwid_cli.trust.judged import PARTS
 
 NAME = "test"
-STAGE_VERSION = 5
+STAGE_VERSION = 6
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,6 +33,8 @@ from hwid_cli.trust.visited import inside
 
 # Share of a step of the covariance by which its effect on the output is found.
 _SMALL = 1e-3
+# Of the signal before the output map, where that is nothing.
+_LEAST_STEP = 1e-12
 # Share of the range over which the slope at an end is taken, as in `model.extrapolation`.
 _OUTER = 1.0 / 8.0
 # Chosen on the plants that `make bench-trust` draws with --choose: how much of an even
@@ -76,7 +78,8 @@ def prediction_band(
         As it leaves the program (`model.extrapolation.outlined_model`).
     values : ndarray, shape (n_samples,), [input unit]
     state : ndarray, shape (n_state,), optional
-        Coefficients of the free response; the model's own unless given.
+        Coefficients of the free response that come closest to the measured output; the
+        model's own unless given.
     """
     terms = error_terms(model, trust, values, state=state)
     return band_of(trust, terms, inside(trust.visited, values, terms.inner))
@@ -131,21 +134,54 @@ def error_terms(
         Its scale does not count.
     values : ndarray, shape (n_samples,), [input unit]
     state : ndarray, shape (n_state,), optional
-        Coefficients of the free response; the model's own unless given.
+        Coefficients of the free response that come closest to the measured output: they
+        follow other parameters. The model's own unless given.
     """
     start = model.free_response if state is None else state
     signal = np.ascontiguousarray(values, dtype=float)
     with np.errstate(over="ignore", invalid="ignore"):
         inner, output = inner_and_output(model, signal, start)
-        variance = np.zeros(signal.size)
-        if trust.steps.size:
-            base = parameter_vector(model)
-            for step in trust.steps:
-                other = with_parameters(model, base + _SMALL * step)
-                _, moved = inner_and_output(other, signal, start)
-                variance += ((moved - output) / _SMALL) ** 2
+        moved = _moved_by_parameters(model, trust, signal, start, output)
+        if state is not None:
+            moved = _without_starts(model, inner, moved)
+        variance = np.sum(moved**2, axis=0)
         continuation = _continuation(model, trust, signal, start, output)
     return ErrorTerms(output, inner, variance, continuation)
+
+
+def _moved_by_parameters(
+    model: HammersteinWiener,
+    trust: ModelTrust,
+    signal: np.ndarray,
+    start: np.ndarray,
+    output: np.ndarray,
+) -> np.ndarray:
+    """How steps of the covariance move the output, shape (n_steps, n_samples)."""
+    if not trust.steps.size:
+        return np.zeros((0, signal.size))
+    base = parameter_vector(model)
+    others = (with_parameters(model, base + _SMALL * step) for step in trust.steps)
+    moved = [inner_and_output(one, signal, start)[1] for one in others]
+    return (np.array(moved) - output) / _SMALL
+
+
+def _without_starts(
+    model: HammersteinWiener, inner: np.ndarray, moved: np.ndarray
+) -> np.ndarray:
+    """What is left of changes of the output where the start follows the measured one.
+
+    Of a pole at 1 a start that stayed would be all there is.
+    """
+    n_state = model.orders.n_state
+    if n_state == 0 or not (np.isfinite(moved).all() and np.isfinite(inner).all()):
+        return moved
+    step = _SMALL * max(float(np.ptp(inner)), float(np.abs(inner).max()), _LEAST_STEP)
+    ends = [static_map.evaluate(model.output_map, inner + at) for at in (step, -step)]
+    slope = (ends[0] - ends[1]) / (2.0 * step)
+    units = np.eye(n_state)
+    free = [free_response(one, model.denominator, inner.size) for one in units]
+    by_start = slope[:, None] * np.array(free).T
+    return np.asarray(moved - (by_start @ np.linalg.lstsq(by_start, moved.T)[0]).T)
 
 
 def inner_and_output(

@@ -11,7 +11,7 @@ from hwid_cli.model.parameter_steps import (
     parameter_vector,
     with_parameters,
 )
-from hwid_cli.model.simulate import simulate
+from hwid_cli.model.simulate import estimated_state, simulate, validation_output
 from hwid_cli.model.uncertainty import parameter_covariance
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
@@ -63,6 +63,41 @@ def test_the_parameters_part_is_the_scatter_of_refitted_models(linear):
     ratio = np.mean(np.var(outputs, axis=0, ddof=1)) / np.mean(terms.parameters)
     # Sixty draws of two parameters: a standard error of about 13 %, at three of them.
     assert 0.6 < ratio < 1.4
+
+
+def axis(name, seed, *, noise=NOISE, n=400):
+    """A place that a speed command moves: a lag and a pole at 1."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-1.0, 1.0, n // 20), 20)
+    y = 40.0 + lfilter([0.0, 0.03], np.convolve([1.0, -0.7], [1.0, -1.0]), u)
+    return Recording(name, u, y + noise * rng.standard_normal(n), 0.01)
+
+
+@pytest.mark.thorough
+def test_beside_a_measured_start_an_axis_is_as_sure_as_refitted_models_agree():
+    options = replace(LINEAR, initial_state="estimated", join="experiments")
+    own, orders = [axis("a", 1), axis("b", 2)], Orders(1, 2, 1)
+    found = fit(own, orders, options)
+    new = axis("new", 7)
+    state = estimated_state(found.model, new)
+    trust = model_trust(found, own, [axis("judge", 3)])
+    terms = error_terms(outlined_model(found.model), trust, new.input, state=state)
+    outputs = []
+    for seed in range(40):
+        again = []
+        for one in own:
+            clean = axis(one.name, 1 + (one.name == "b"), noise=0.0).output
+            rng = np.random.default_rng([9, seed, one.name == "b"])
+            noisy = clean + NOISE * rng.standard_normal(clean.size)
+            again.append(replace(one, output=noisy))
+        outputs.append(validation_output(fit(again, orders, options).model, new))
+    ratio = np.mean(np.var(outputs, axis=0, ddof=1)) / np.mean(terms.parameters)
+    assert 0.5 < ratio < 2.0
+    # With a start that stays where it is it would be thousands of times as much.
+    held = error_terms(
+        replace(outlined_model(found.model), free_response=state), trust, new.input
+    )
+    assert np.mean(held.parameters) > 100.0 * np.mean(terms.parameters)
 
 
 def test_vector_and_model_are_two_forms_of_one():
