@@ -99,6 +99,7 @@ def known_faults(experiment: Experiment) -> Iterator[Fault]:
     inside = BASE_AND_MASS if is_force else BASE_PARAMETERS
     names = [name_on(axis_of(options), one) for one in inside]
     names += ["inductance_H"] if options.inductance_H > 0 else []
+    names += ["resistance_ohm"] if options.resistance_ohm is not None else []
     for name, tolerance in options.known.items():
         place = ("simulation", "known")
         if name not in (*names, *inside):

@@ -14,6 +14,7 @@ from hwid_cli.diagnosis.candidate import (
     base_start,
     compared_with_fit,
     fit_candidate,
+    fitted_drive,
     present_start,
     start_from,
     with_input_noise,
@@ -47,6 +48,8 @@ _LEAST_OF_NOISE = 0.5
 # A base that leaves at most this share of what another one leaves beyond the noise has
 # found a better minimum.
 _MUCH_LESS = 0.5
+# Damping that has vanished in a fit, as a share of the given one, or of what back-EMF makes.
+_VANISHED = 0.01
 # Parameters of what repeats along the way or in time: each has many minima.
 _REPEATS = {"period_m", "per_turn", "frequency_Hz"}
 
@@ -82,6 +85,7 @@ def fitted_base(problem: DiagnosisProblem) -> FittedBase:
     given = compared_as_given(problem)
     scales = scales_of_recordings(problem, [one.velocity for one in given])
     base = _refit_base(problem, scales, noise)
+    problem, base = _with_resistance(problem, base, scales, noise)
     if _is_too_much(base, noise, problem.n_evaluated) or _shakes_at_rest(
         problem, base, scales, noise
     ):
@@ -170,6 +174,44 @@ def _refit_base(
     starts = grown_starts(start, tuple(present), scales)
     grown = fit_grown(problem, found, starts, scales, noise)
     return grown if grown.sse.sum() < found.sse.sum() else found
+
+
+def _with_resistance(
+    problem: DiagnosisProblem, base: CandidateFit, scales: Scales, noise: NoiseFloor
+) -> tuple[DiagnosisProblem, CandidateFit]:
+    """A motor's resistance fitted instead of a damping that should be below 0.
+
+    A winding is a fifth more or less than stated where it is cold or hot, and back-EMF is
+    a damping that goes with it.
+    """
+    if base.whiteness <= 1.0 or not asks_for_resistance(problem, base):
+        return problem, base
+    free = _resistance_freed(problem)
+    found = _refit_base(free, scales, noise)
+    return (free, found) if found.sse.sum() < base.sse.sum() else (problem, base)
+
+
+def with_free_resistance(fitted: FittedBase) -> FittedBase:
+    """The base with the resistance fitted instead of the damping."""
+    problem = _resistance_freed(fitted.problem)
+    base = _refit_base(problem, fitted.scales, fitted.noise)
+    return _with_causes(replace(fitted, problem=problem, base=base))
+
+
+def asks_for_resistance(problem: DiagnosisProblem, found: CandidateFit) -> bool:
+    """Whether the damping of a motor under a voltage has vanished in a fit."""
+    drive = problem.drive
+    if drive.resistance_ohm is None or "resistance_ohm" in problem.known:
+        return False
+    if drive.is_resistance_free or "damping_N_s_per_m" in problem.known:
+        return False
+    back_emf = drive.force_constant_N_per_A**2 / drive.resistance_ohm
+    given = drive.damping_N_s_per_m or back_emf
+    return fitted_drive(drive, found).damping_N_s_per_m <= _VANISHED * given
+
+
+def _resistance_freed(problem: DiagnosisProblem) -> DiagnosisProblem:
+    return replace(problem, drive=replace(problem.drive, is_resistance_free=True))
 
 
 def _is_too_much(base: CandidateFit, noise: NoiseFloor, n_samples: int) -> bool:

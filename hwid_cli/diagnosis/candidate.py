@@ -180,7 +180,8 @@ def reached_by(problem: DiagnosisProblem, found: SearchResult) -> SearchStart:
 
 def base_of(drive: Drive) -> dict[str, float]:
     """Parameters of a drive's base, by name."""
-    return {one: float(getattr(drive, one)) for one in BASE_AND_MASS}
+    names = dict.fromkeys((*BASE_AND_MASS, *drive.fitted_base))
+    return {one: float(getattr(drive, one)) for one in names}
 
 
 def fit_candidate(

@@ -12,9 +12,11 @@ import numpy as np
 
 from hwid_cli.diagnosis.base_fit import (
     FittedBase,
+    asks_for_resistance,
     compared_as_given,
     fitted_base,
     fitted_from,
+    with_free_resistance,
 )
 from hwid_cli.diagnosis.candidate import (
     Baseline,
@@ -318,6 +320,14 @@ class _Searched:
         base = self.rounds.base
         return base.is_usable and not self.rounds.criteria.needs_nothing(base)
 
+    @property
+    def best(self) -> CandidateFit | None:
+        """The set of effects of the lowest criterion, if there is one."""
+        criteria, base = self.rounds.criteria, self.rounds.base
+        fits = [one for one in self.found.fits.values() if one.is_usable]
+        best = max(fits, key=lambda one: criteria.gain(one, base), default=None)
+        return best if best is not None and criteria.gain(best, base) > 0 else None
+
 
 def _searched(
     problem: DiagnosisProblem,
@@ -333,9 +343,18 @@ def _searched(
         fitted = _with_odd_ones_trained(fitted)
     searched = _beside(fitted, options, run_tasks, on_round, given_sse)
     better = _better_base(fitted, searched)
-    if better is None:
+    if better is not None:
+        fitted = better
+        searched = _beside(fitted, options, run_tasks, on_round, given_sse)
+    best = searched.best
+    if best is None or not asks_for_resistance(fitted.problem, best):
         return searched
-    return _beside(better, options, run_tasks, on_round, given_sse)
+    free = with_free_resistance(fitted)
+    other = _beside(free, options, run_tasks, on_round, given_sse)
+    is_better = other.best is not None and (
+        searched.rounds.criteria.gain(other.best, best) > 0
+    )
+    return other if is_better else searched
 
 
 def _better_base(fitted: FittedBase, searched: _Searched) -> FittedBase | None:

@@ -417,6 +417,12 @@ def _held_and_known(drive: Drive) -> tuple[tuple[str, ...], str]:
     leaves these quotients as they are leaves the motion as it is.
     """
     mass, constant = _WORDS[drive.axis]
+    if drive.is_resistance_free:
+        return ("mass_kg", "damping_N_s_per_m"), (
+            f"known is only {constant} / (resistance x {mass}), (damping + {constant}^2 / "
+            f"resistance) / {mass} and stiffness / {mass}; the resistance was fitted, "
+            "because a damping below 0 would have been needed beside the given one"
+        )
     if drive.resistance_ohm is None:
         return ("mass_kg",), (
             f"{constant}, damping and stiffness are known only in proportion to it"

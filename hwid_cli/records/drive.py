@@ -37,6 +37,12 @@ BASE_PARAMETERS = (
 BASE_UNDER_FORCE = ("mass_kg", "damping_N_s_per_m", "stiffness_N_per_m")
 # All that the motion of the base depends on.
 BASE_AND_MASS = ("mass_kg", *BASE_PARAMETERS)
+# Of a motor under a voltage whose resistance is off, so that a damping below 0 would fit.
+BASE_WITH_RESISTANCE = (
+    "resistance_ohm",
+    "stiffness_N_per_m",
+    "force_constant_N_per_A",
+)
 # What the input of a simulation may be, by the unit of its numbers; a force as it acts.
 SOURCES = {"A": "current", "V": "voltage", "N": "force", "N m": "torque"}
 FORCES = ("N", "N m")
@@ -208,6 +214,9 @@ class Drive:
     input_unit : str
         One of ``SOURCES``; empty for A, or V where there is a circuit. Under N and N m the
         force constant is a number without unit, and exact.
+    is_resistance_free : bool
+        Whether a re-fit moves the resistance in the place of the damping: of both,
+        recordings tell one.
     """
 
     mass_kg: Annotated[float, POSITIVE] = 1.0
@@ -225,6 +234,7 @@ class Drive:
     output: Annotated[str, OneOf(OUTPUTS)] = "position"
     axis: Annotated[str, OneOf(AXES)] = "linear"
     input_unit: Annotated[str, OneOf(("", *SOURCES))] = ""
+    is_resistance_free: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -258,6 +268,8 @@ class Drive:
     @property
     def fitted_base(self) -> tuple[str, ...]:
         """Parameters of the base that a re-fit may move; the other one sets the scale."""
+        if self.is_resistance_free:
+            return BASE_WITH_RESISTANCE
         return BASE_UNDER_FORCE if self.is_driven_by_force else BASE_PARAMETERS
 
 
