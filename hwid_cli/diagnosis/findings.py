@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hwid_cli.diagnosis.behind_loop import unseen_in_command
 from hwid_cli.diagnosis.candidate import compared_with_fit, fitted_drive
 from hwid_cli.diagnosis.held_command import OtherCommand
 from hwid_cli.diagnosis.intervals import intervals
@@ -183,6 +184,7 @@ class Findings:
         sample_time_s = min(one.sample_time_s for one in self.problem.signals)
         return (
             *self.warnings,
+            *unseen_in_command(self.problem, self.verdict.chosen, self.scales),
             *untold_command(self.problem, self.is_untold),
             *doubtful_values(parameters, self.problem.drive),
             *hardly_late(effects, sample_time_s),
