@@ -20,7 +20,7 @@ from hwid_cli.files.messages import is_plain
 from hwid_cli.model.maps.rule import Part
 from hwid_cli.model.parameter_steps import parameter_vector
 from hwid_cli.records.axis import ROTARY_NAMES, base_of, name_on
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import NOT_IN_FILES, Drive
 from hwid_cli.records.experiment import Columns, Experiment, FileUnits
 from hwid_cli.records.exported import (
     Exported,
@@ -239,9 +239,7 @@ def _drive(path: Path, given: Mapping[str, Any]) -> Drive:
         if name_on(base["axis"], name) not in given:
             place = ("simulation", name_on(base["axis"], name))
             refuse(path, place, None, "a finite number")
-    others = (
-        set(Drive.__dataclass_fields__) - set(ROTARY_NAMES) - {"axis", "input_unit"}
-    )
+    others = {*Drive.__dataclass_fields__} - {*ROTARY_NAMES} - {*NOT_IN_FILES}
     return Drive(**base, **{name: getattr(read, name) for name in others})
 
 

@@ -10,7 +10,7 @@ from hwid_cli import __version__
 from hwid_cli.export.map_parts import numbers_of
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.records.axis import name_on
-from hwid_cli.records.drive import Drive, as_written
+from hwid_cli.records.drive import NOT_IN_FILES, Drive, as_written
 from hwid_cli.records.exported import (
     Exported,
     ExportedModel,
@@ -130,7 +130,7 @@ def plain_drive(drive: Drive) -> dict[str, Any]:
     content = {
         name_on(drive.axis, name): getattr(drive, name)
         for name in Drive.__dataclass_fields__
-        if name not in ("effects", "controller", "axis", "input_unit")
+        if name not in ("effects", "controller", *NOT_IN_FILES)
     }
     content["effects"] = as_written(
         {identifier: dict(values) for identifier, values in drive.effects.items()}

@@ -37,6 +37,9 @@ BASE_PARAMETERS = (
 BASE_UNDER_FORCE = ("mass_kg", "damping_N_s_per_m", "stiffness_N_per_m")
 # All that the motion of the base depends on.
 BASE_AND_MASS = ("mass_kg", *BASE_PARAMETERS)
+# Fields of a drive that its file form has not: two are told by the names of others, one is
+# a matter of a re-fit.
+NOT_IN_FILES = ("axis", "input_unit", "is_resistance_free")
 # Of a motor under a voltage whose resistance is off, so that a damping below 0 would fit.
 BASE_WITH_RESISTANCE = (
     "resistance_ohm",
