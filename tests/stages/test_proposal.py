@@ -189,3 +189,20 @@ def test_a_ramp_under_a_controller_is_not_cut_where_it_moves_already(slope, reci
         current, speed = motor_under_speed_control(slope, seed)
         ramps.append(RawRecording(name, current, speed, 1e-3))
     assert propose(ramps).recipes["step"] == recipe
+
+
+def at_a_level(name, before, after, gain=1.4):
+    """A heater that rests where its input holds it, and warms or cools from there."""
+    u = np.r_[np.full(80, before), np.full(300, after)]
+    y = np.full(u.size, 293.0 + gain * before)
+    for k in range(1, u.size):
+        y[k] = y[k - 1] + 0.03 * (293.0 + gain * u[k - 1] - y[k - 1])
+    noise = 0.05 * np.random.default_rng(len(name)).standard_normal(u.size)
+    return RawRecording(name, u, y + noise, 1.0)
+
+
+def test_levels_that_go_with_the_input_stay_beside_recordings_that_begin_in_motion():
+    steps = [at_a_level("step_cold", 0.0, 200.0), at_a_level("step_hot", 250.0, 60.0)]
+    found = propose([*steps, raw("random_1", 100.0 * levels(3))])
+    assert found.recipes["step"] == ("cut",)
+    assert "goes with the input, and stays" in found.recipe_reason
