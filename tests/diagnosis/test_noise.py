@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hwid_cli.diagnosis.noise import noise_floor, noise_levels
+from hwid_cli.diagnosis.noise import (
+    _without_common_motion,
+    noise_floor,
+    noise_levels,
+)
 from hwid_cli.diagnosis.whiteness import whiteness
 from hwid_cli.drive.simulation import simulate_drive
 from tests.diagnosis.diagnosed import (
@@ -438,3 +442,14 @@ def test_a_motion_that_all_rests_begin_with_is_no_noise(is_common):
         # Each its own: slow noise looks like that.
         assert found.method == "rest"
         assert found.rms > 2e-4
+
+
+def test_slow_noise_of_few_rests_hardly_ever_passes_for_a_common_motion():
+    rng = np.random.default_rng(0)
+    taken = 0
+    for _ in range(300):
+        shocks = rng.standard_normal((3, 340))
+        slow = list(lfilter([1.0], [1.0, -0.99], shocks, axis=1)[:, 300:])
+        taken += _without_common_motion(slow) is not slow
+    # By their RMS alone it is one of twenty.
+    assert taken <= 7

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.own_parameters import fit_parameters
+from hwid_cli.diagnosis.simulator import DIFFERENCE, difference_for
 from hwid_cli.records.programs import FreeParameter, SimulatorRun
 
 FREE = {
@@ -60,3 +61,27 @@ def test_no_run_is_asked_for_twice_in_a_search():
     valley = Valley()
     fitted(valley)
     assert len(set(valley.asked)) == len(valley.asked)
+
+
+def test_a_difference_is_as_wide_as_a_rough_simulation_needs():
+    """Outputs to two decimals: a thousandth of the parameter changes none of them."""
+    measured = 1.3 * np.linspace(0.0, 2.0, 200)
+
+    def rough(_signals, values):
+        return [SimulatorRun(np.round(values["a"] * measured / 1.3, 2), np.zeros(0))]
+
+    one = SimpleNamespace(
+        compared=measured, evaluated=slice(None), n_evaluated=200, is_held_out=False
+    )
+    free = {"a": FreeParameter(1.0, (0.1, 5.0))}
+    found = fit_parameters(rough, [one], free, {"a": 1.0})
+    assert found["a"] == pytest.approx(1.3, rel=5e-3)
+
+
+def test_differences_go_from_a_thousandth_to_a_twentieth():
+    slope = np.ones(50)
+    assert difference_for(slope, 1e-9) == DIFFERENCE
+    assert difference_for(slope, 0.1) == pytest.approx(0.01)
+    assert difference_for(slope, 1e9) == pytest.approx(0.05)
+    assert difference_for(0.0 * slope, 1.0) == pytest.approx(0.05)
+    assert difference_for(np.inf * slope, 1.0) == DIFFERENCE

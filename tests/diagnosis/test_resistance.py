@@ -12,7 +12,7 @@ from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.stages.diagnose import diagnose
 
 STEP_S, N, NOISE = 0.002, 700, 0.15
-INERTIA, CONSTANT, RESISTANCE, DAMPING, DRAG = 1e-3, 0.08, 1.0, 1e-4, 8e-6
+INERTIA, CONSTANT, RESISTANCE, DAMPING, DRAG = 1e-3, 0.08, 1.0, 1e-4, 1e-4
 # A fifth too much: beside its back-EMF no damping above 0 is small enough.
 GIVEN = SimulationOptions(
     mass_kg=INERTIA, damping_N_s_per_m=1.2e-4, force_constant_N_per_A=0.97 * CONSTANT,
@@ -57,7 +57,11 @@ def test_a_winding_that_is_colder_than_stated_is_no_missing_effect():
 @pytest.mark.thorough
 def test_beside_a_drag_the_resistance_is_found_where_the_damping_vanishes():
     options = DiagnoseOptions(laws="never")
-    found = diagnose(list(recordings(DRAG)), GIVEN, options)
+    given = list(recordings(DRAG))
+    # The base alone makes a damping of the drag.
+    base = fitted_base(prepare(given, GIVEN, options, ()))
+    assert not base.problem.drive.is_resistance_free
+    found = diagnose(given, GIVEN, options)
     assert [one.id for one in found.effects] == ["quadratic_drag"]
     assert found.complete
     (drag,) = found.effects[0].parameters

@@ -8,6 +8,7 @@ import pytest
 
 from hwid_cli.diagnosis import turns
 from hwid_cli.diagnosis.turns import Turn, best_turn
+from hwid_cli.records.programs import FreeParameter, SimulatorRun
 from tests.diagnosis.made_up_fits import base, made_up
 from tests.diagnosis.small_drive import problem, recordings
 
@@ -105,3 +106,17 @@ def test_three_turns_are_enough_where_another_effect_leaves_far_less(taken):
     assert taken(falls, agrees=False, rival=20.0)[0] == 3
     # Within its reach it goes on.
     assert taken(falls, agrees=False, rival=30.0)[0] == 16
+
+
+def test_derivatives_by_a_parameter_are_seen_beside_the_rounding_of_a_run():
+    way = np.linspace(0.0, 1.0, 100)
+
+    def push(values):
+        return [SimulatorRun(np.round(values["a"] * way, 3), np.zeros(0))]
+
+    found = push({"a": 1.0})
+    parameter = ("a", FreeParameter(1.0, (0.1, 5.0)))
+    (rough,) = turns._slope(push, {"a": 1.0}, parameter, found, 0.0)
+    (seen,) = turns._slope(push, {"a": 1.0}, parameter, found, 0.5)
+    assert np.corrcoef(seen, way)[0, 1] > 0.99
+    assert np.corrcoef(rough, way)[0, 1] < 0.95
