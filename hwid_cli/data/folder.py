@@ -14,18 +14,17 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from hwid_cli.data import column_signs as signs
-from hwid_cli.data.column_roles import (
+from hwid_cli.data.column_clocks import (
     FEWEST_SAMPLES,
     ROUND_STAMPS,
-    SignalGuess,
     TimeGuess,
     clocks_of,
-    guess_signals,
     guess_time,
     long_columns,
     unit_of_column,
     unused_times,
 )
+from hwid_cli.data.column_roles import SignalGuess, guess_signals
 from hwid_cli.data.column_words import counts_recordings, meaning_of
 from hwid_cli.data.formats import SUFFIXES, list_columns, reader_of
 from hwid_cli.data.header_stamps import topic_of

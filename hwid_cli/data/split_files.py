@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, takewhile
 from pathlib import PurePosixPath
 
-from hwid_cli.data.column_roles import long_columns
+from hwid_cli.data.column_clocks import long_columns
 from hwid_cli.data.column_signs import clock_of
 from hwid_cli.data.column_words import meaning_of
 from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role

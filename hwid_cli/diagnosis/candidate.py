@@ -571,21 +571,19 @@ def bends_effects(drive: Drive, found: CandidateFit) -> bool:
 
 def without_base(found: CandidateFit) -> CandidateFit:
     """The fit of the effects alone; the base stays as the drive has it."""
-    is_kept = np.array([one.owner != BASE for one in found.names], dtype=bool)
-    names = tuple(one for one in found.names if one.owner != BASE)
-    return replace(found, names=names, values=found.values[is_kept])
+    return without_owner(found, BASE)
 
 
-def without_owner(found: CandidateFit, effect: str) -> CandidateFit:
-    """The fit without one of its effects; the values of the others stay."""
-    kept = np.array([one.owner != effect for one in found.names], dtype=bool)
-    own = np.array([one.owner != effect for one in found.own_names], dtype=bool)
+def without_owner(found: CandidateFit, owner: str) -> CandidateFit:
+    """The fit without an effect, its base or its starts; the values of the others stay."""
+    kept = np.array([one.owner != owner for one in found.names], dtype=bool)
+    own = np.array([one.owner != owner for one in found.own_names], dtype=bool)
     return replace(
         found,
-        effects=tuple(one for one in found.effects if one != effect),
-        names=tuple(one for one in found.names if one.owner != effect),
+        effects=tuple(one for one in found.effects if one != owner),
+        names=tuple(one for one in found.names if one.owner != owner),
         values=found.values[kept],
-        own_names=tuple(one for one in found.own_names if one.owner != effect),
+        own_names=tuple(one for one in found.own_names if one.owner != owner),
         own=found.own[:, own],
         valleys=found.valleys[:, kept] if found.valleys.size else found.valleys,
     )
@@ -601,9 +599,7 @@ def with_values(
 
 def without_starts(found: CandidateFit) -> CandidateFit:
     """The fit without where its recordings start, beside starts that are known."""
-    kept = [row for row, one in enumerate(found.own_names) if one.owner != START]
-    names = tuple(found.own_names[row] for row in kept)
-    return replace(found, own_names=names, own=found.own[:, kept])
+    return without_owner(found, START)
 
 
 def fitted_drive(drive: Drive, found: CandidateFit) -> Drive:

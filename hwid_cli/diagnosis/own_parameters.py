@@ -1,12 +1,13 @@
 """The parameters of a simulation of the user's own, fitted through its runs."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import scipy
 
 from hwid_cli.diagnosis.problem import Signals
-from hwid_cli.diagnosis.simulator import CLEARLY_WIDER, DIFFERENCE, difference_for
+from hwid_cli.diagnosis.simulator import derivative, difference_for
 from hwid_cli.records.programs import FreeParameter, SimulatorRun
 
 # Evaluations of a search; it goes on, so many times at most, where the last few of them
@@ -134,12 +135,14 @@ class _Gap:
         rms = float(np.sqrt(np.mean(here**2)))
         columns = []
         for column in range(coordinates.size):
+            difference = partial(self._difference, coordinates, here, column)
             last = self._slopes.get(column)
-            step = DIFFERENCE if last is None else difference_for(last, rms)
-            slope = self._difference(coordinates, here, column, step)
-            wanted = difference_for(slope, rms)
-            if last is None and wanted > CLEARLY_WIDER * step:
-                slope = self._difference(coordinates, here, column, wanted)
+            # The last slope tells how wide the next difference has to be.
+            slope = (
+                derivative(difference, rms)
+                if last is None
+                else difference(difference_for(last, rms))
+            )
             # At the edge of what it can be run with, a parameter stays.
             slope = slope if np.isfinite(slope).all() else np.zeros(here.size)
             self._slopes[column] = slope

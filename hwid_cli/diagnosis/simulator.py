@@ -25,7 +25,7 @@ DIFFERENCE = 1e-3
 _MOST_WIDER = 50.0
 _LEAST_CHANGE = 0.1
 # A difference that should be wider by more than this is taken again.
-CLEARLY_WIDER = 2.0
+_CLEARLY_WIDER = 2.0
 
 
 def difference_for(slope: np.ndarray, errors_rms: float) -> float:
@@ -50,6 +50,26 @@ def difference_for(slope: np.ndarray, errors_rms: float) -> float:
     most = _MOST_WIDER * DIFFERENCE
     least = _LEAST_CHANGE * errors_rms
     return float(np.clip(least / size, DIFFERENCE, most)) if size > 0 else most
+
+
+def derivative(slope: Callable[[float], np.ndarray], errors_rms: float) -> np.ndarray:
+    """A derivative by a difference that is as wide as the simulation needs.
+
+    Parameters
+    ----------
+    slope : callable
+        What a parameter changes over the share of its size by which it is changed, shape
+        (n_samples,), [output unit].
+    errors_rms : float, [output unit]
+        What the derivative is used on.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [output unit]
+    """
+    found = slope(DIFFERENCE)
+    wanted = difference_for(found, errors_rms)
+    return slope(wanted) if wanted > _CLEARLY_WIDER * DIFFERENCE else found
 
 
 @dataclass(frozen=True, eq=False)

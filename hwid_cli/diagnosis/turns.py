@@ -31,7 +31,7 @@ from hwid_cli.diagnosis.parameters import (
     simulate_at,
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.simulator import CLEARLY_WIDER, DIFFERENCE, Runs, difference_for
+from hwid_cli.diagnosis.simulator import Runs, derivative
 from hwid_cli.diagnosis.stand_in import (
     act_as_forces,
     corrected,
@@ -407,17 +407,17 @@ def _slope(
     name, one = parameter
     size = abs(values[name]) or abs(one.value) or 1.0
 
-    def slope(share: float) -> list[np.ndarray]:
+    def slope(share: float) -> np.ndarray:
         step = share * size
         if values[name] + step > one.limits[1]:
             step = -step
         there = push({**values, name: values[name] + step}) or found
         pairs = zip(there, found, strict=True)
-        return [(after.output - before.output) / step for after, before in pairs]
+        changes = [after.output - before.output for after, before in pairs]
+        return np.concatenate(changes) / (step / size)
 
-    slopes = slope(DIFFERENCE)
-    wanted = difference_for(np.concatenate(slopes) * size, noise_rms)
-    return slope(wanted) if wanted > CLEARLY_WIDER * DIFFERENCE else slopes
+    ends = np.cumsum([run.output.size for run in found])[:-1]
+    return np.split(derivative(slope, noise_rms) / size, ends)
 
 
 def pushed(

@@ -9,6 +9,7 @@ docs/method_diagnosis.md, eq. (D32a).
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import QUANTILE
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.simulator import CLEARLY_WIDER, DIFFERENCE, Runs, difference_for
+from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs, derivative
 from hwid_cli.diagnosis.turns import acts_at_force, forces_along, pushed
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.diagnosis import BaseParameter, FittedEffect, Law
@@ -279,11 +280,8 @@ class _Moving:
         """Derivatives by the logarithms; shape (n_evaluated, n)."""
         columns = []
         for column in range(self.size):
-            slope = self._slope(before, column, DIFFERENCE)
-            wanted = difference_for(slope, errors_rms=1.0)
-            if wanted > CLEARLY_WIDER * DIFFERENCE:
-                slope = self._slope(before, column, wanted)
-            columns.append(slope)
+            slope = partial(self._slope, before, column)
+            columns.append(derivative(slope, errors_rms=1.0))
         return np.column_stack(columns)
 
     def _slope(self, before: np.ndarray, column: int, width: float) -> np.ndarray:

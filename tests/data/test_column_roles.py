@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from hwid_cli.data.column_roles import guess_signals, guess_time, unused_times
+from hwid_cli.data.column_clocks import guess_time, unused_times
+from hwid_cli.data.column_roles import guess_signals
 from hwid_cli.data.units import unit_in_name
 from hwid_cli.records.starter import FoundColumn
 

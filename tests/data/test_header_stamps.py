@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.data.column_roles import guess_time
+from hwid_cli.data.column_clocks import guess_time
 from hwid_cli.data.folder import guess_layout, list_measurements
 from hwid_cli.data.recordings import read_recordings, survey_recordings
 from hwid_cli.data.sampling import missing_samples

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from hwid_cli.data.column_roles import guess_time
+from hwid_cli.data.column_clocks import guess_time
 from hwid_cli.data.formats import list_columns
 
 N = 200

@@ -339,3 +339,30 @@ def test_a_longer_delay_is_taken_where_recordings_ask_for_it(delay):
     new = levels("new", 9, delay)
     left = new.output - simulate(whole.model, new.input)
     assert np.sqrt(np.mean(left[50:] ** 2)) < 0.03
+
+
+@pytest.mark.parametrize(
+    ("bics", "off", "expected"),
+    [
+        ((0.0, -5.0, -90.0, -40.0), (0.1, 0.2), (1, 2)),
+        # Hardly a better fit; what is left out speaks against it; none is longer.
+        ((0.0, -5.0, -15.0, -10.0), (0.1, 0.2), ()),
+        ((0.0, -5.0, -90.0, -40.0), (0.3, 0.2), ()),
+        ((0.0, -90.0, -80.0, -40.0), (0.1, 0.2), ()),
+    ],
+)
+def test_fit_and_left_out_recordings_have_to_ask_for_a_delay(bics, off, expected):
+    """Criteria without a delay and with 1, 2 and 3; how far off late and plain ones are."""
+    delays = (1, 2, 3)
+    plain = Candidate(OPTIONS, 1, 2, Orders(1, 2, 1))
+    best = delays[int(np.argmin(bics[1:]))]
+    late = replace(plain, options=replace(OPTIONS, delays=(best,)))
+    folds = object.__new__(together._Folds)
+    folds._task = lambda *_: None
+    folds._fits = lambda _: [
+        SimpleNamespace(information=SimpleNamespace(bic=bic)) for bic in bics
+    ]
+    folds.best_of = lambda _: None
+    folds._fits_of = {late: "late", plain: "plain"}
+    folds._off = lambda fits, **_: off[fits == "plain"]
+    assert folds.delays_needed(plain, delays) == expected
