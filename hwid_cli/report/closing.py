@@ -72,9 +72,8 @@ def best_model_sentences(best: BestModel) -> list[str]:
     ...                   linear_name="linear:a/1/2")
     >>> for said in best_model_sentences(found):
     ...     print(*said.split())
-    a/2/3: RMSD 0.002 m on 1 recording never used (c)
+    a/2/3: RMSD 0.002 m on 1 recording never used (c); below the 0.01 m of crossval.threshold
     best linear model, linear:a/1/2: 0.03 m
-    below the 0.01 m of crossval.threshold
     """
     which = listed(best.judged_on, most=_FEW)
     many = counted(len(best.judged_on), "recording")
@@ -91,7 +90,7 @@ def best_model_sentences(best: BestModel) -> list[str]:
         return _nothing_to_take(best, on)
     if best.is_linear_better:
         return _linear_sentences(best, mean, on)
-    said = [f"{best.name}: {mean} {with_unit(best.rmsd, best.unit)} on {on}"]
+    said = [f"{best.name}: {mean} {_judged(best.rmsd, on, best)}"]
     if best.own_maps:
         maps = " and ".join(map_words(*one) for one in best.own_maps)
         said.append(f"its maps, {maps}, come closest to recordings left out in turn")
@@ -104,7 +103,6 @@ def best_model_sentences(best: BestModel) -> list[str]:
                 f"; over all recordings but its own {best.name} leaves "
                 f"{best.linear_ratio:.2g} times as much as that"
             )
-    said += _beside_threshold(best.rmsd, best)
     if best.single and np.isfinite(best.single_rmsd):
         helps = "helps" if best.rmsd < best.single_rmsd else "does not help"
         single = with_unit(best.single_rmsd, best.unit)
@@ -116,7 +114,20 @@ def _linear_model(best: BestModel) -> str:
     """Which linear model stands beside a model; one without a name has its orders."""
     if not best.linear_name:
         return "linear model of the same orders"
-    return f"best linear model, {best.linear_name}"
+    return f"best linear model, {_short_name(best.linear_name)}"
+
+
+def _short_name(name: str) -> str:
+    """Name a model by its orders where many recordings make its name a long one.
+
+    Examples
+    --------
+    >>> _short_name("linear:a+b+c+d/4/5"), _short_name("linear:a+b/4/5")
+    ('of 4 recordings, orders 4/5', 'linear:a+b/4/5')
+    """
+    joined, _, orders = name.partition("/")
+    count = joined.count("+") + 1
+    return name if count <= _FEW else f"of {count} recordings, orders {orders}"
 
 
 def _nothing_to_take(best: BestModel, on: str) -> list[str]:
@@ -152,26 +163,26 @@ def linear_is(linear_rmsd: float, own_rmsd: float) -> str:
 
 def _linear_sentences(best: BestModel, mean: str, on: str) -> list[str]:
     """Say that maps make a model worse where its fit has not seen the recordings."""
-    linear, own = (with_unit(rmsd, best.unit) for rmsd in (best.linear_rmsd, best.rmsd))
+    own = with_unit(best.rmsd, best.unit)
     how = linear_is(best.linear_rmsd, best.rmsd)
     return [
-        f"a linear model is {how}, {best.linear_name}: {mean} {linear} on {on}",
-        *_beside_threshold(best.linear_rmsd, best),
+        f"a linear model is {how}, {best.linear_name}: "
+        f"{mean} {_judged(best.linear_rmsd, on, best)}",
         f"{best.name}: {own}; these maps are not worth it here",
     ]
 
 
-def _beside_threshold(rmsd: float, best: BestModel) -> list[str]:
-    """On which side of the threshold an RMSD lies; nothing without a threshold."""
+def _judged(rmsd: float, on: str, best: BestModel) -> str:
+    """Write an RMSD, on what, and on which side of the threshold it lies."""
+    written, limit = (with_unit(one, best.unit) for one in (rmsd, best.threshold))
     if not np.isfinite(best.threshold):
-        return []
+        return f"{written} on {on}"
     side = "below" if rmsd < best.threshold else "NOT below"
-    limit = with_unit(best.threshold, best.unit)
     by = ""
-    if limit == with_unit(rmsd, best.unit) and rmsd != best.threshold:
+    if limit == written and rmsd != best.threshold:
         # Both look alike as they are rounded.
         by = f", by {_percent(100.0 * abs(rmsd / best.threshold - 1.0))}"
-    return [f"{side} the {limit} of crossval.threshold{by}"]
+    return f"{written} on {on}; {side} the {limit} of crossval.threshold{by}"
 
 
 def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
