@@ -383,10 +383,9 @@ def _fit_lines(proposal: Proposal) -> list[str]:
 
 def _validation_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     unit = _si_unit(layout.output) or "the output's unit"
-    lines = ["# Models of these recordings, judged on all of them."]
-    chosen = _flow(list(proposal.identify)) if proposal.identify else "all"
-    lines += [f"identify: {{recordings: {chosen}}}"]
-    lines += [
+    lines = [
+        "# Models of all recordings but those of 'test', judged on all of these.",
+        "identify: {recordings: all}",
         f"# A model covers a recording when its RMSD lies below, in {unit}:",
         f"# {proposal.threshold_reason}. Put the deviation that you can live with.",
         f"crossval: {{threshold: {proposal.threshold!r}}}",

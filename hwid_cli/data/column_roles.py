@@ -20,7 +20,9 @@ from hwid_cli.data.column_clocks import (
     unit_of_column,
 )
 from hwid_cli.data.column_words import (
+    CURRENT,
     OF_UNIT,
+    VOLTAGE,
     Meaning,
     counts_recordings,
     may_drive,
@@ -48,6 +50,8 @@ _LAST_CURRENT_RANK = meaning_of("iz").rank
 _CLEAR = 0.3
 # Beyond this the numbers speak against the names, [-].
 _AGAINST = -0.6
+# What is held by so much more of its samples than the other is a command, [-].
+_CLEARLY_HELD = 0.5
 _ANSWERS = "by its content: it answers to the input"
 _IS_ANSWERED = "by its content: the output answers to it"
 # How much being smoother than the input counts beside the answer to it, [-].
@@ -326,8 +330,33 @@ def _along_chain(
         return None
     first = inputs[min(known, key=lambda number: known[number])]
     last = inputs[max(known, key=lambda number: known[number])]
+    if _is_circuit(first, last) and _is_driven_by(first, last):
+        return last, first, {"input": _IS_ANSWERED, "output": _ANSWERS}
     why = {"input": _by(first), "output": f"{_by(last)}: nearer to the motion"}
     return first, last, why
+
+
+def _is_circuit(first: _Named, last: _Named) -> bool:
+    """Whether two columns are a voltage and a current.
+
+    A source drives a current through a winding, a load a battery's voltage.
+    """
+    places = {
+        place_in_chain(one.column.title, one.column.unit) for one in (first, last)
+    }
+    return places == {VOLTAGE, CURRENT}
+
+
+def _is_driven_by(first: _Named, last: _Named) -> bool:
+    """Whether the last is held in steps, as a command is, and the first answers to it.
+
+    Behind a current controller a voltage answers too, but a measured current is not held.
+    """
+    held = [
+        float(np.median([signs.held_share(part) for part in one.recordings]))
+        for one in (first, last)
+    ]
+    return held[1] > held[0] + _CLEARLY_HELD and _answer(first, last) < 0
 
 
 def _by_content(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
@@ -377,6 +406,7 @@ def _order_notes(first: _Named, last: _Named, reasons: dict[str, str]) -> list[s
     one, other = _called(first.column), _called(last.column)
     swap = f"columns: {{input: {_key(last)}, output: {_key(first)}}}"
     by_name = all(why.startswith("by its name") for why in reasons.values())
+    by_name = by_name and not _is_circuit(first, last)
     if by_name and found < _AGAINST:
         return [
             f"NOT SURE: by their names {one} drives {other}; in the numbers {one} "

@@ -218,6 +218,8 @@ _CHAIN = (
     ("current", "strom", "strm", "amp", "amps", "ampere", "i", "iq", "im", "iz", "ia"),
     ("torque", "drehmoment", "moment", "trq", "force", "kraft"),
 )
+# Places in it of the two ends of a circuit.
+VOLTAGE, CURRENT = 1, 2
 # The same of units.
 _CHAIN_UNITS = (
     (),

@@ -64,6 +64,37 @@ def test_of_a_voltage_and_a_current_the_voltage_drives():
         assert guessed(*columns)[:2] == ("U", "I")
 
 
+def battery(seed=3):
+    """A load's current in steps, and the voltage of the cell that answers to it."""
+    rng = np.random.default_rng(seed)
+    current = np.repeat(rng.choice([-5.0, 0.0, 2.0, 10.0], 30), 40)
+    slow = np.zeros(current.size)
+    for row in range(1, current.size):
+        slow[row] = slow[row - 1] + (current[row - 1] - slow[row - 1]) / 25
+    voltage = 3.7 - 0.02 * current - 0.015 * slow
+    return current, voltage + rng.normal(0, 0.003, current.size)
+
+
+def test_a_current_that_is_held_in_steps_drives_the_voltage_that_answers():
+    current, voltage = battery()
+    for columns in (
+        (("Voltage(V)", voltage), ("Current(A)", current)),
+        (("Current(A)", current), ("Voltage(V)", voltage)),
+    ):
+        first, last, found = guessed(*columns)
+        assert (first, last) == ("Current(A)", "Voltage(V)")
+        assert "by its content" in found.reasons["input"]
+
+
+def test_of_a_voltage_and_a_current_that_answer_to_neither_nothing_is_sure():
+    rng = np.random.default_rng(5)
+    first, last, found = guessed(
+        ("U", rng.normal(size=900)), ("I", rng.normal(size=900))
+    )
+    assert (first, last) == ("U", "I")
+    assert any("NOT SURE whether 'U' drives 'I'" in note for note in found.notes)
+
+
 def test_units_say_the_roles_of_channels():
     found = guessed(("CH1", POSITION, "mm"), ("CH2", CURRENT, "A"))
     assert found[:2] == ("CH2", "CH1")
