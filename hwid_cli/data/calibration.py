@@ -19,14 +19,13 @@ import numpy as np
 
 from hwid_cli.data.signal_features import (
     LEAST_QUIET,
-    find_damaged,
     find_onset,
     find_period,
     mean_over_period,
-    replace_damaged,
     whole_periods,
 )
 from hwid_cli.errors import MeasurementError
+from hwid_cli.model.damaged_samples import repaired
 from hwid_cli.records.experiment import CalibrateOptions
 from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
 from hwid_cli.records.units import behind
@@ -83,28 +82,19 @@ def run_recipe(draft: Draft) -> Draft:
 
 def _repair(draft: Draft) -> Draft:
     log = draft.log
-    values_in, found_in = _repaired(draft.input, log.first_sample, may_hold=True)
-    values_out, found_out = _repaired(draft.output, log.first_sample, may_hold=False)
+    values_in, found_in = repaired(draft.input)
+    values_out, found_out = repaired(draft.output, may_hold=False)
+    before_in, before_out = log.repaired_input, log.repaired_output
     log = replace(
         log,
-        repaired_input=tuple(sorted({*log.repaired_input, *found_in})),
-        repaired_output=tuple(sorted({*log.repaired_output, *found_out})),
+        repaired_input=_with(before_in, found_in + log.first_sample),
+        repaired_output=_with(before_out, found_out + log.first_sample),
     )
     return replace(draft, input=values_in, output=values_out, log=log)
 
 
-def _repaired(
-    values: np.ndarray, first: int, *, may_hold: bool
-) -> tuple[np.ndarray, list[int]]:
-    """Replace damaged samples until none is left: each one widens the scale."""
-    indices: list[int] = []
-    for _ in range(MOST_ROUNDS):
-        damaged = find_damaged(values, may_hold=may_hold)
-        if damaged.size == 0:
-            break
-        values = replace_damaged(values, damaged)
-        indices += [first + int(index) for index in damaged]
-    return values, indices
+def _with(before: tuple[int, ...], found: np.ndarray) -> tuple[int, ...]:
+    return tuple(sorted({*before, *found.tolist()}))
 
 
 def _cut(draft: Draft) -> Draft:
@@ -268,10 +258,10 @@ def as_measured(
     if log.removed.size != n_removed:
         return None
     found, rest = [], log.removed
-    for values, offset, n_raw, repaired in sides:
-        sizes = np.cumsum([first, n_raw - n_samples - first, len(repaired)])
+    for values, offset, n_raw, replaced in sides:
+        sizes = np.cumsum([first, n_raw - n_samples - first, len(replaced)])
         before, behind, damaged, rest = np.split(rest, sizes)
         signal = np.concatenate([before, values + offset, behind])
-        signal[list(repaired)] = damaged
+        signal[list(replaced)] = damaged
         found.append(signal)
     return found[0], found[1]

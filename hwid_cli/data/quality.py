@@ -8,7 +8,7 @@ change from sample to sample are suspected.
 import numpy as np
 
 from hwid_cli.data.column_signs import held_share
-from hwid_cli.data.signal_features import find_damaged
+from hwid_cli.model.damaged_samples import find_damaged
 
 # Signals that hold their value for more of the time do so on purpose, [-].
 _HOLDS = 0.5

@@ -15,6 +15,7 @@ from hwid_cli.diagnosis.input_noise import whiteness_with_input_noise
 from hwid_cli.diagnosis.noise import measured_input_rms
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.whiteness import portmanteau, whiteness
+from hwid_cli.model.damaged_samples import repaired
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive, StandIn
 
@@ -27,6 +28,8 @@ _LEAST_REPEATED, _MOST_REPEATED = 2e-3, 0.25
 _BY_CHANCE = 2.0
 _LEAST_CHANCE = 1e-3
 _STOPPED = 3.0
+# Damaged samples are rarer than this share.
+_MOST_DAMAGED = 0.01
 # Correlations of neighbours, and of the next but one, that interpolation makes at most.
 _MOST_LINKED = (0.35, 0.1)
 
@@ -35,6 +38,30 @@ def without_repeats(problem: DiagnosisProblem) -> DiagnosisProblem:
     """Leave out samples that repeat the one before, where a logger did so."""
     signals = tuple(_without_repeats(one) for one in problem.signals)
     return replace(problem, signals=signals)
+
+
+def without_damage(problem: DiagnosisProblem) -> DiagnosisProblem:
+    """Leave out samples of a sensor that stand out alone, and replace such inputs.
+
+    Nothing that a drive does takes one sample or two. Under a controller they are in the
+    command, which the machine has answered to.
+    """
+    if problem.compares_command:
+        return problem
+    signals, damaged, count = [], [], 0
+    for one in problem.signals:
+        driven_by, _ = repaired(one.driven_by)
+        _, found = repaired(one.compared, may_hold=False)
+        if 0 < found.size <= _MOST_DAMAGED * one.compared.size:
+            undamaged = np.ones(one.compared.size, dtype=bool)
+            undamaged[found] = False
+            one = one.only(undamaged)
+            damaged.append(one.name)
+            count += found.size
+        signals.append(one.repaired(driven_by))
+    return replace(
+        problem, signals=tuple(signals), n_damaged=count, damaged=tuple(damaged)
+    )
 
 
 def _without_repeats(signals: Signals) -> Signals:

@@ -24,8 +24,9 @@ from hwid_cli.diagnosis.candidate import (
     fitted_drive,
     rebuilt,
 )
-from hwid_cli.diagnosis.causes import without_repeats
+from hwid_cli.diagnosis.causes import without_damage, without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
+from hwid_cli.diagnosis.found_start import with_found_start
 from hwid_cli.diagnosis.held_command import (
     best_of,
     does_as_well,
@@ -111,7 +112,8 @@ def _problem(
 ) -> DiagnosisProblem:
     """What a diagnosis of recordings works on."""
     held_out = held_out_of(recordings, options)
-    return without_repeats(prepare(recordings, simulation, options, held_out))
+    problem = prepare(recordings, simulation, options, held_out)
+    return without_damage(without_repeats(problem))
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,7 +340,7 @@ def _searched(
 ) -> _Searched:
     """Fit the base again, and search for sets of effects."""
     on_round("base", 0)
-    fitted = fitted_base(problem)
+    fitted = _from_found_start(fitted_base(problem), problem)
     if isinstance(options.hold_out, str):
         fitted = _with_odd_ones_trained(fitted)
     searched = _beside(fitted, options, run_tasks, on_round, given_sse)
@@ -355,6 +357,18 @@ def _searched(
         searched.rounds.criteria.gain(other.best, best) > 0
     )
     return other if is_better else searched
+
+
+def _from_found_start(fitted: FittedBase, problem: DiagnosisProblem) -> FittedBase:
+    """The base from where recordings start, where they do not start in balance.
+
+    Zeros of the sensor that differ are no places of the machine.
+    """
+    criteria = SelectionCriteria.of(fitted.problem, fitted.noise)
+    if fitted.base.is_usable and criteria.needs_nothing(fitted.base):
+        return fitted
+    found = with_found_start(problem)
+    return fitted if found is problem else fitted_base(found)
 
 
 def _better_base(fitted: FittedBase, searched: _Searched) -> FittedBase | None:
@@ -523,6 +537,6 @@ def allowed_effects(
         and (has_spring or not effect.needs_spring)
         and not (has_spring and effect.needs_free_axis)
         and (has_circuit or not effect.needs_circuit)
-        and (several or not any(one.is_own for one in effect.parameters))
+        and (several or not any(one.is_factor for one in effect.parameters))
         and not (problem.compares_command and effect.enters == "output")
     )

@@ -25,10 +25,12 @@ from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.diagnosis.sentences import (
     doubtful_values,
+    found_start,
     hardly_late,
     held_in_words,
     hidden_from_view,
     law_in_words,
+    left_out,
     summarise,
     taken_up,
     unseen_beside,
@@ -184,6 +186,8 @@ class Findings:
         sample_time_s = min(one.sample_time_s for one in self.problem.signals)
         return (
             *self.warnings,
+            *found_start(self.problem),
+            *left_out(self.problem),
             *unseen_in_command(self.problem, self.verdict.chosen, self.scales),
             *untold_command(self.problem, self.is_untold),
             *doubtful_values(parameters, self.problem.drive),

@@ -207,6 +207,13 @@ class DiagnosisProblem:
     stand_in_error : float, [output unit squared]
         Sum of squares by which a stand-in that no run corrects may be wrong about what
         lies between simulation and recordings.
+    start_told_by : tuple of str
+        Names of the recordings whose first samples have told how recordings start,
+        where the configuration says otherwise.
+    n_damaged : int, [samples]
+        Left out as damage of the sensor.
+    damaged : tuple of str
+        Names of the recordings that hold them.
     may_be_held : bool
         Whether nobody has said how the command goes on between samples, so that the
         recordings may tell that it is held.
@@ -219,6 +226,9 @@ class DiagnosisProblem:
     input_unit: str = "A"
     known: Mapping[str, float] = field(default_factory=dict)
     stand_in_error: float = 0.0
+    start_told_by: tuple[str, ...] = ()
+    n_damaged: int = 0
+    damaged: tuple[str, ...] = ()
     may_be_held: bool = False
 
     @property

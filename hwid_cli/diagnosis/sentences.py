@@ -521,3 +521,37 @@ def _unseen_sides(problem: DiagnosisProblem) -> list[str]:
     if highest < _ONE_SIDE * reach:
         texts.append("anything on the positive side, where the drive never is")
     return texts
+
+
+def found_start(problem: DiagnosisProblem) -> tuple[str, ...]:
+    """Say how recordings start, where their first samples have told it."""
+    names = problem.start_told_by
+    if not names:
+        return ()
+    how = {
+        "estimated": "in motion: place and speed at the start of each recording are fitted",
+        "held": "at rest away from their balance: how far, and the sensor's zero, are "
+        "fitted for each recording",
+    }[problem.start]
+    starts = "starts" if len(names) == 1 else "start"
+    return (f"{_few(names)} {starts} {how} (diagnose.initial_state: {problem.start})",)
+
+
+def left_out(problem: DiagnosisProblem) -> tuple[str, ...]:
+    """Say how many samples do not count, because they stand out alone."""
+    count = problem.n_damaged
+    if not count:
+        return ()
+    of = _few(problem.damaged)
+    if count == 1:
+        return (
+            f"1 sample of {of} stands out alone, as damage does, and does not count",
+        )
+    return (
+        f"{count} samples of {of} stand out alone, as damage does, and do not count",
+    )
+
+
+def _few(names: Sequence[str]) -> str:
+    more = len(names) - _MOST_NAMED
+    return ", ".join(names[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -2,13 +2,12 @@ import numpy as np
 import pytest
 
 from hwid_cli.data.signal_features import (
-    find_damaged,
     find_onset,
     find_period,
     mean_over_period,
-    replace_damaged,
     whole_periods,
 )
+from hwid_cli.model.damaged_samples import find_damaged, replace_damaged
 
 
 def with_lead_in(excitation, lead_in, *, offset=0.0, noise=0.0, seed=1):

@@ -1,0 +1,122 @@
+"""How recordings start, where their first samples speak against a start in balance.
+
+A recording that begins while the machine turns, or at rest where friction has left it, is
+off from its first sample beside a simulation that starts in balance; effects would be
+blamed for that. docs/method_diagnosis.md, eq. (D18a).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hwid_cli.diagnosis.base_fit import compared_as_given
+from hwid_cli.diagnosis.noise import noise_floor
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
+from hwid_cli.records.drive import StandIn
+
+# What is seen in first samples has to be so many times its error.
+_CLEARLY = 5.0
+# Speeds at a start are clear beyond this share of the largest one, [-].
+_LEAST_SPEED = 0.05
+# Places at a start differ beyond this share of the motion, [-].
+_LEAST_SPREAD = 0.01
+# Parameters that are off explain less than this share of what differs, [-].
+_MOST_EXPLAINED = 0.5
+# Samples of which the first speed is told; twice as many have to say the same, [samples].
+_FIRST = (8, 16, 32, 64)
+# To within this share, [-].
+_SAME = 0.3
+# At most this share of a recording is its beginning, [-].
+_BEGINNING = 0.1
+
+
+def with_found_start(problem: DiagnosisProblem) -> DiagnosisProblem:
+    """Let recordings start as they do, where that is not at rest in balance.
+
+    Returns
+    -------
+    DiagnosisProblem
+        As it came where nothing speaks against its start, or where nothing can be told:
+        under a controller, of pieces, beside a simulation of another kind, and where a
+        start is fitted already.
+    """
+    is_open = problem.start == "rest" and not problem.has_starts
+    if not is_open or problem.compares_command or isinstance(problem.drive, StandIn):
+        return problem
+    noise = noise_floor(problem).rms
+    moving = tuple(one.name for one in problem.signals if _starts_in_motion(one, noise))
+    if moving:
+        return replace(problem, start="estimated", start_told_by=moving)
+    elsewhere = _held_elsewhere(problem, noise)
+    if elsewhere:
+        return replace(problem, start="held", start_told_by=elsewhere)
+    return problem
+
+
+def _starts_in_motion(signals: Signals, noise: float) -> bool:
+    """Whether a recording has a speed at its first sample, whatever acts on it.
+
+    From rest a position goes with the square of the time, a speed with the time.
+    """
+    output = signals.output
+    largest = _largest_speed(signals)
+    for n in _FIRST:
+        if 2 * n > _BEGINNING * output.size:
+            return False
+        (speed, error), (again, _) = (
+            _first_speed(signals, count, noise) for count in (n, 2 * n)
+        )
+        is_clear = abs(speed) > max(_CLEARLY * error, _LEAST_SPEED * largest)
+        if is_clear and abs(again - speed) < _SAME * abs(speed):
+            return True
+    return False
+
+
+def _largest_speed(signals: Signals) -> float:
+    """Largest speed over a stretch of samples, which noise does not make, [m/s]."""
+    if signals.is_velocity:
+        return float(np.max(np.abs(signals.output)))
+    n = _FIRST[0]
+    ways = np.abs(signals.output[n:] - signals.output[:-n])
+    return float(np.max(ways, initial=0.0)) / (n * signals.sample_time_s)
+
+
+def _first_speed(signals: Signals, n: int, noise: float) -> tuple[float, float]:
+    """Speed at the first sample and its error, from the first n, [m/s]."""
+    powers = np.arange(2 if signals.is_velocity else 3)
+    columns = np.power.outer(np.arange(n) * signals.sample_time_s, powers)
+    values, *_ = np.linalg.lstsq(columns, signals.output[:n], rcond=None)
+    errors = noise * np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
+    which = 0 if signals.is_velocity else 1
+    return float(values[which]), float(errors[which])
+
+
+def _held_elsewhere(problem: DiagnosisProblem, noise: float) -> tuple[str, ...]:
+    """Recordings, if these rest at places that no balance with their inputs explains."""
+    is_position = not any(one.is_velocity for one in problem.signals)
+    if problem.drive.stiffness_N_per_m == 0 or not is_position:
+        return ()
+    beside = compared_as_given(problem)
+    firsts = [max(rest_length(one.driven_by), 1) for one in problem.signals]
+    read = np.array(
+        [
+            np.mean(one.output[:n])
+            for one, n in zip(problem.signals, firsts, strict=True)
+        ]
+    )
+    off = np.array(
+        [
+            np.mean((one.signals.compared - one.simulated)[:n])
+            for one, n in zip(beside, firsts, strict=True)
+        ]
+    )
+    motion = max(float(np.ptp(one.output)) for one in problem.signals)
+    least = max(
+        _CLEARLY * noise, _LEAST_SPREAD * motion, _MOST_EXPLAINED * np.ptp(read)
+    )
+    if not np.ptp(off) > least:
+        return ()
+    away = np.abs(off - np.median(off)) > 0.5 * least
+    return tuple(
+        one.name for one, is_away in zip(problem.signals, away, strict=True) if is_away
+    )
