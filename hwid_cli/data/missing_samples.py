@@ -23,6 +23,10 @@ _MOST_BRIDGED = 0.01
 _LONGEST_BRIDGE = 10
 # Instruments send 9.9E37 for overflow and 9.91E37 for no number (SCPI 1999, 7.2.1).
 _NO_NUMBER, _NO_MORE = 9.9e37, 1e38
+# Loggers write these, where they are farther from the others than this many times these
+# reach (LAS 2.0 has -999.25 in its header).
+_CODES = (-999.0, -999.25, -9999.0, -9999.25, -99999.0, -999999.0, 9999.0, 99999.0)
+_FAR = 2.0
 
 
 def missing(column: MeasuredColumn) -> np.ndarray:
@@ -82,7 +86,19 @@ def bridge_missing(
 
 
 def _says_none(values: np.ndarray) -> np.ndarray:
-    return (np.abs(values) >= _NO_NUMBER) & (np.abs(values) < _NO_MORE)
+    size = np.abs(values)
+    return ((size >= _NO_NUMBER) & (size < _NO_MORE)) | _are_codes(values)
+
+
+def _are_codes(values: np.ndarray) -> np.ndarray:
+    """Which values are a logger's number for no number, far from all others."""
+    found = np.isin(values, _CODES)
+    others = values[np.isfinite(values) & ~found]
+    if not found.any() or others.size == 0:
+        return np.zeros(values.size, dtype=bool)
+    low, high = float(others.min()), float(others.max())
+    away = _FAR * max(high - low, abs(low), abs(high))
+    return found & ((values < low - away) | (values > high + away))
 
 
 def _bridged(column: MeasuredColumn) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hwid_cli.data.calibration import as_measured
+from hwid_cli.data.as_measured import as_measured
 from hwid_cli.records.recordings import CalibrationLog, Recording
 
 # Inches and dots: 800 x 500 pixels, fast to draw and sharp enough to judge a cut.

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.data.calibration import as_measured
+from hwid_cli.data.as_measured import as_measured
 from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.problem import prepare

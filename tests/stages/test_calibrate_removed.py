@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.data.calibration import as_measured
+from hwid_cli.data.as_measured import as_measured
 from hwid_cli.stages.calibrate import calibrate_all
 from hwid_cli.store.results import read_calibrated, write_calibrated
 from tests.stages.test_calibrate import THESIS, measurement, raw

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hwid_cli.data.calibration import as_measured
+from hwid_cli.data.as_measured import as_measured
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.calibration import calibration_table
