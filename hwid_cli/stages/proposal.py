@@ -20,6 +20,7 @@ from hwid_cli.stages.proposed_starts import (
     ALIKE_LEVELS,
     begins_at_rest,
     rest_level,
+    rests_anywhere,
     rests_at_operating_points,
     start_of_diagnosis,
     start_of_fits,
@@ -238,6 +239,10 @@ def _recipes(
         fitting = [one for one in candidates if _works(one, kind, own)]
         recipes[kind] = fitting[0] if fitting else ()
     recipes, level = _with_common_level(raws, kinds, recipes)
+    own_levels = _with_own_levels(raws, kinds, recipes)
+    if own_levels is not None:
+        reason = "the output rests at other levels under one input: each is subtracted"
+        return own_levels, reason
     some = [
         kind
         for kind, recipe in recipes.items()
@@ -252,6 +257,33 @@ def _recipes(
     if all(begins_at_rest(raw) for raw in raws):
         return recipes, "nothing is cut: the rest before may be a level of the input"
     return recipes, "no rest is cut: not all recordings begin with one"
+
+
+def _with_own_levels(
+    raws: Sequence[RawRecording],
+    kinds: dict[str, str],
+    recipes: dict[str, tuple[str, ...]],
+) -> dict[str, tuple[str, ...]] | None:
+    """Recipes that subtract where each recording rests, if the input does not say where.
+
+    A battery at another charge, an axis at another place: no model of the input knows.
+
+    Returns
+    -------
+    dict or None
+        None where all rest where their inputs say, or recipes do it already.
+    """
+    if not all(map(begins_at_rest, raws)) or not rests_anywhere(raws):
+        return None
+    found = {
+        kind: recipe if "output_offset" in recipe else (*recipe, "output_offset")
+        for kind, recipe in recipes.items()
+    }
+    works = all(
+        _works(recipe, kind, [raw for raw in raws if kinds[raw.name] == kind])
+        for kind, recipe in found.items()
+    )
+    return found if works and found != recipes else None
 
 
 def _with_common_level(

@@ -44,6 +44,14 @@ def rests_at_operating_points(raws: Sequence[RawRecording]) -> bool:
     return bool(is_held.any()) and _rest_where_the_input_says(raws, {}, kinds)
 
 
+def rests_anywhere(raws: Sequence[RawRecording]) -> bool:
+    """Whether one level of the input goes with several levels of the output."""
+    inputs = np.array([_rest_levels(raw)[0] for raw in raws])
+    is_one = np.ptp(inputs) <= ALIKE_LEVELS * swing_of([raw.input for raw in raws])
+    kinds = {raw.name: raw.kind for raw in raws}
+    return bool(is_one) and not _rest_where_the_input_says(raws, {}, kinds)
+
+
 def swing_of(signals: Sequence[np.ndarray]) -> float:
     """Median range of signals."""
     return float(np.median([np.nanmax(one) - np.nanmin(one) for one in signals]))
