@@ -27,10 +27,12 @@ from hwid_cli.records.candidates import CandidateFit, ParameterRef
 QUANTILE = 1.96
 # Share of the best determined direction below which one counts as undetermined.
 _DETERMINED = 1e-12
-# Difference for derivatives of an effect's size, in coordinates.
 # A strength that is so near its bound would go farther, [-].
 _AT_BOUND = 0.999
+# Difference for derivatives of an effect's size, in coordinates.
 _STEP = 1e-4
+# A logarithm that may be off by more, a factor of a million, tells nothing of its value.
+_NOT_TOLD = 14.0
 
 
 def unclear_effects(
@@ -40,7 +42,8 @@ def unclear_effects(
 
     The interval of an effect's strength reaches zero, or that of the parameter that tells
     it from what it contains; or its strength went as far as it may: it imitates. What the
-    simulation has of the latter shares the strength in any way, and is held for that.
+    simulation has of the latter shares the strength in any way, and is held for that; the
+    effect's own share of it may be none.
 
     Returns
     -------
@@ -62,10 +65,14 @@ def unclear_effects(
         # Of a logarithm linearised: a relative deviation of the value itself.
         return reach < 1.0 if unknown.is_log else bool(abs(q) > reach)
 
+    def telling(effect: str) -> tuple[ParameterRef, ...]:
+        refs = _telling(effect, found.names)
+        is_shared = bool(_contained(effect, found.effects, fit_layout))
+        own = CATALOGUE[effect].told_by
+        return tuple(one for one in refs if not is_shared or one.parameter == own)
+
     return tuple(
-        effect
-        for effect in found.effects
-        if not all(map(is_clear, _telling(effect, found.names)))
+        effect for effect in found.effects if not all(map(is_clear, telling(effect)))
     )
 
 
@@ -161,13 +168,15 @@ def intervals(
     Returns
     -------
     low, high : ndarray, shape (n_names,)
-        NaN where a recording cannot be simulated.
+        NaN where a recording cannot be simulated, or a value may be anything.
     """
     if not found.is_usable:
         nothing = np.full(found.values.size, np.nan)
         return nothing, nothing
     fit_layout, point = rebuilt(problem, found, scales)
     reaches = _spread(problem, found, fit_layout, point).reaches()
+    of_logs = np.array([one.is_log for one in fit_layout.shared], dtype=bool)
+    reaches[of_logs & (reaches > _NOT_TOLD)] = np.nan
     with np.errstate(over="ignore"):
         ends = np.array(
             [

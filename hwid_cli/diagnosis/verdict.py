@@ -293,6 +293,9 @@ def needs_each(
         is_shift = is_incomplete and _is_small_beside_impacts(criteria, fits[left])
         least = LEAST_CONTRIBUTION_FAR if is_far or is_shift else LEAST_CONTRIBUTION
         least = LEAST_LAST_CONTRIBUTION if is_last else least
+        # Beside an effect without which nothing can be followed any other one is small.
+        is_all = is_last and leaves(whole)
+        least = 0.0 if is_all and criteria.ratio(fits[left]) > STILL_LARGE else least
         is_clear = is_clear and brings >= least * criteria.excess(base)
         is_clear = is_clear and criteria.is_beyond_stand_in(whole, fits[left])
         if not (is_clear and explains):

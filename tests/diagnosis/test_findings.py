@@ -225,14 +225,14 @@ def test_they_grow_with_the_noise():
     np.testing.assert_allclose(widths[1] / widths[0], 50, rtol=0.1)
 
 
-def test_what_nothing_determines_has_a_wide_one():
+def test_what_nothing_determines_has_a_wide_one_or_none():
     # One constant current: how strong the drive is cannot be told from its stiffness.
     held = recordings()[0]
     current = np.full_like(held.input, 2.0)
     noise = NOISE * np.random.default_rng(2).standard_normal(current.size)
     flat = replace(held, input=current, output=2.0 * 5.0 / 1184.0 + noise)
     found, low, high = with_interval(problem([flat]), {})
-    assert ((high - low) > found.values).all()
+    assert (np.isnan(high) | ((high - low) > found.values)).all()
 
 
 @pytest.mark.parametrize(
