@@ -20,12 +20,15 @@ _CLEARLY = 5.0
 _LEAST_SPEED = 0.05
 # Places at a start differ beyond this share of the motion, [-].
 _LEAST_SPREAD = 0.01
-# Parameters that are off explain less than this share of what differs, [-].
+# Parameters that are off explain less than this share of what inputs ask for, [-].
 _MOST_EXPLAINED = 0.5
 # Samples of which the first speed is told; twice as many have to say the same, [samples].
 _FIRST = (8, 16, 32, 64)
 # To within this share, [-].
 _SAME = 0.3
+# Of a rest before the input moves so many count: of one that follows a step of it, those
+# in which a drive has not answered yet, [samples].
+_FEW = 16
 # At most this share of a recording is its beginning, [-].
 _BEGINNING = 0.1
 
@@ -97,26 +100,18 @@ def _held_elsewhere(problem: DiagnosisProblem, noise: float) -> tuple[str, ...]:
     if problem.drive.stiffness_N_per_m == 0 or not is_position:
         return ()
     beside = compared_as_given(problem)
-    firsts = [max(rest_length(one.driven_by), 1) for one in problem.signals]
-    read = np.array(
-        [
-            np.mean(one.output[:n])
-            for one, n in zip(problem.signals, firsts, strict=True)
-        ]
-    )
-    off = np.array(
-        [
-            np.mean((one.signals.compared - one.simulated)[:n])
-            for one, n in zip(beside, firsts, strict=True)
-        ]
-    )
+    still = np.array([max(rest_length(one.driven_by), 1) for one in problem.signals])
+    pairs = list(zip(beside, np.minimum(still, _FEW), strict=True))
+    asked = np.array([np.mean(one.simulated[:n]) for one, n in pairs])
+    off = np.array([np.mean(one.signals.compared[:n]) for one, n in pairs]) - asked
     motion = max(float(np.ptp(one.output)) for one in problem.signals)
-    least = max(
-        _CLEARLY * noise, _LEAST_SPREAD * motion, _MOST_EXPLAINED * np.ptp(read)
-    )
-    if not np.ptp(off) > least:
+    differ = max(_LEAST_SPREAD * motion, _MOST_EXPLAINED * float(np.ptp(asked)))
+    if not np.ptp(off) > max(_CLEARLY * noise, differ):
         return ()
-    away = np.abs(off - np.median(off)) > 0.5 * least
+    # Those that keep a rest are where their inputs hold them, most likely.
+    usual = np.median(off[still > 0.5 * still.max()])
+    least = np.maximum(_CLEARLY * noise, _MOST_EXPLAINED * np.abs(asked))
+    away = np.abs(off - usual) > least
     return tuple(
         one.name for one, is_away in zip(problem.signals, away, strict=True) if is_away
     )

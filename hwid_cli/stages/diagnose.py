@@ -34,8 +34,6 @@ from hwid_cli.stages.diagnosis_seconds import LEAST_RUNS, MOST_RUNS, time_diagno
 from hwid_cli.stages.diagnosis_starts import (
     moving_sentence,
     moving_starts,
-    starts_sentence,
-    unsettled_starts,
     with_rests,
 )
 from hwid_cli.stages.fit_seconds import counted
@@ -376,7 +374,7 @@ def _simulation(experiment: Experiment) -> SimulationOptions | ForeignSimulation
 
 
 def _warnings(context: Context, given: ToDiagnose) -> list[str]:
-    """What the units are taken for, and which recordings cannot start in equilibrium."""
+    """What the units are taken for, and which recordings a cut begins in motion."""
     recordings, simulation, options = given.recordings, given.simulation, given.options
     if not isinstance(simulation, SimulationOptions):
         said = [_announcement(simulation)]
@@ -394,15 +392,8 @@ def _warnings(context: Context, given: ToDiagnose) -> list[str]:
         doubtful_sizes(given.experiment, recordings, simulation, options, given.logs),
     ]
     moving = moving_starts(recordings, given.logs, simulation, options)
-    names = [
-        name
-        for name in unsettled_starts(recordings, simulation, options)
-        if name not in moving
-    ]
-    starts = starts_sentence(names, recordings, given.experiment.calibrate)
-    for sentence in (moving_sentence(moving, recordings), starts):
-        if sentence:
-            said.append(f"{context.experiment.source}: {sentence}")
+    if sentence := moving_sentence(moving, recordings):
+        said.append(f"{context.experiment.source}: {sentence}")
     if simulation.controller is None and "identify" not in context.results:
         said.append(swapped_sentence(recordings, str(context.experiment.source)))
     return [one for one in said if one]

@@ -1,12 +1,9 @@
-"""Whether recordings can start as a diagnosis takes them to: at rest, in equilibrium.
+"""Whether `cut` leaves recordings a start that a diagnosis can take: at rest.
 
 Models need no rest before an excitation, and `cut` takes it away. A simulation starts from
-it: the last of it is given back where the log has it.
-
-A recording that was cut at the onset of its excitation begins with an input to which the
-drive has not answered yet; a simulation that starts in equilibrium with that input is off
-from its first sample, and no missing effect explains that. Where the cut went on into the
-motion, as it may in a random signal, the drive is not even at rest.
+it: the last of it is given back where the log has it. Where the cut went on into the motion,
+as it may in a random signal, the drive is not at rest. What first samples themselves tell is
+found out with the base (``hwid_cli/diagnosis/found_start.py``).
 """
 
 from collections.abc import Sequence
@@ -20,17 +17,13 @@ from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.axis import base_of
 from hwid_cli.records.experiment import (
-    CalibrateOptions,
     DiagnoseOptions,
     SimulationOptions,
 )
 from hwid_cli.records.recordings import CalibrationLog, Recording
 
-# A first sample is away from the equilibrium beyond this many times the noise, [-] ...
+# A first sample is away from the equilibrium beyond this many times the noise, [-].
 _AWAY = 5.0
-# ... and this share of what the first input asks for: parameters from data sheets are
-# not off by so much, [-].
-_AWAY_SHARE = 0.5
 _MOST_NAMED = 4
 # So much of a rest is given back, enough to be one, [samples].
 _KEPT_REST = 2 * LEAST_QUIET
@@ -75,53 +68,6 @@ def _with_rest(recording: Recording, log: CalibrationLog) -> Recording:
         input=np.r_[rest_input, recording.input],
         output=np.r_[rest_output, recording.output],
     )
-
-
-def unsettled_starts(
-    recordings: Sequence[Recording],
-    simulation: SimulationOptions,
-    options: DiagnoseOptions,
-) -> tuple[str, ...]:
-    """Find recordings that do not begin in equilibrium, where they are taken to.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        At least one, as the diagnosis gets them.
-
-    Returns
-    -------
-    tuple of str
-        Names of those without a rest before the excitation whose first output is far
-        from the equilibrium of the linear drive with the first input. None where a
-        diagnosis fits how recordings start, under a controller, without a spring and
-        where a velocity is measured.
-    """
-    if options.initial_state != "rest" or simulation.controller is not None:
-        return ()
-    base = base_of(simulation)
-    stiffness = base.get("stiffness_N_per_m", 0.0)
-    if not stiffness > 0 or simulation.output == "velocity":
-        return ()
-    noise = noise_floor(prepare(recordings, simulation, options, ())).rms
-    constant = base.get("force_constant_N_per_A", 1.0)
-    gain = constant / (stiffness * (simulation.resistance_ohm or 1.0))
-    rests = [_rest(one) for one in recordings]
-    zeros = [
-        float(np.mean(one.output[:rest] - gain * one.input[:rest]))
-        for one, rest in zip(recordings, rests, strict=True)
-        if rest
-    ]
-    # A load, or the zero of the sensor.
-    zero = float(np.median(zeros)) if zeros else 0.0
-    found = []
-    for one, rest in zip(recordings, rests, strict=True):
-        asked = abs(gain * float(one.input[0]))
-        away = abs(float(one.output[0]) - zero - gain * float(one.input[0]))
-        is_known = bool(zeros) or asked > _AWAY * noise
-        if not rest and is_known and away > max(_AWAY * noise, _AWAY_SHARE * asked):
-            found.append(one.name)
-    return tuple(found)
 
 
 def moving_starts(
@@ -209,45 +155,6 @@ def moving_sentence(names: Sequence[str], recordings: Sequence[Recording]) -> st
         f"{'it' if is_one else 'them'} at rest; leave 'cut' out of {where}, or "
         "write diagnose.initial_state: estimated, which fits the start"
     )
-
-
-def starts_sentence(
-    names: Sequence[str],
-    recordings: Sequence[Recording],
-    calibrate: CalibrateOptions | None,
-) -> str:
-    """Say which recordings do not begin in equilibrium, and what to do.
-
-    Parameters
-    ----------
-    names : sequence of str
-        From ``unsettled_starts``.
-
-    Returns
-    -------
-    str
-        One line; empty without names.
-    """
-    if not names:
-        return ""
-    kinds = dict.fromkeys(one.kind for one in recordings if one.name in names)
-    cut = [kind for kind in kinds if calibrate and "cut" in getattr(calibrate, kind)]
-    advice = "'held' keeps the level before the excitation, 'estimated' fits the start"
-    if cut:
-        where = " and ".join(f"calibrate.{kind}" for kind in cut)
-        advice += f"; or leave 'cut' out of {where}, which takes the rest away"
-    return (
-        "diagnose.initial_state: 'rest' starts each recording in equilibrium with its "
-        f"first input, but {_shown(names)} begin{'s' * (len(names) == 1)} within the "
-        f"excitation, away from it; {advice}"
-    )
-
-
-def _rest(recording: Recording) -> int:
-    """Samples before the excitation; 0 where there are too few to be a rest."""
-    onset = find_onset(recording.input, quiet_is_rest=True)
-    onset = recording.n_samples if onset is None else onset
-    return onset if onset >= LEAST_QUIET else 0
 
 
 def _shown(names: Sequence[str]) -> str:

@@ -6,7 +6,6 @@ import pytest
 from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
-from tests.cli.drive_examples import CONFIG, write_measurements
 
 
 def check(path, *options):
@@ -230,35 +229,6 @@ def test_time_that_cannot_be_estimated_is_said_to_be_left_out(simulated):
 
     text = " ".join(result.stdout.split())
     assert "start of the program and diagnose apart" in text
-
-
-def drive_whose_sines_begin(folder, first):
-    """Recordings of a drive, the first samples of the sines taken away."""
-    write_measurements(folder / "data")
-    for path in (folder / "data").glob("sine_*.csv"):
-        head, *rows = path.read_text().splitlines()
-        path.write_text("\n".join([head, *rows[first:]]))
-    path = folder / "drive.yaml"
-    path.write_text(CONFIG)
-    return path
-
-
-def test_a_start_away_from_equilibrium_is_warned_of(tmp_path):
-    result = check(drive_whose_sines_begin(tmp_path, 5), "--no-timing")
-
-    assert result.exit_code == 0
-    (line,) = result.stderr.splitlines()
-    assert f"{tmp_path / 'drive.yaml'}: diagnose.initial_state: 'rest' starts" in line
-    assert "sine_01, sine_02, sine_03, sine_04 begin within the excitation" in line
-
-
-def test_a_start_in_equilibrium_or_fitted_gives_no_warning(tmp_path):
-    path = drive_whose_sines_begin(tmp_path, 0)
-    assert check(path, "--no-timing").stderr == ""
-
-    later = drive_whose_sines_begin(tmp_path / "later", 5)
-    later.write_text(CONFIG.replace("max_effects: 1", "initial_state: held"))
-    assert check(later, "--no-timing").stderr == ""
 
 
 def test_programs_read_the_plan_from_stdout_and_people_from_stderr(simulated):

@@ -277,7 +277,7 @@ def test_quiet_says_nothing(again):
 
 
 @pytest.mark.thorough
-def test_a_start_away_from_equilibrium_is_one_line_of_warning(config, edit, again):
+def test_a_start_away_from_balance_is_fitted_and_said(config, edit, again):
     for path in (config.parent / "data").glob("sine_*.csv"):
         head, *rows = path.read_text().splitlines()
         path.write_text("\n".join([head, *rows[5:]]))
@@ -285,10 +285,10 @@ def test_a_start_away_from_equilibrium_is_one_line_of_warning(config, edit, agai
     result = again()
 
     assert result.exit_code == 0, result.output
-    (line,) = re.findall(r"^hwid: .*", result.stderr, re.M)
-    assert "diagnose.initial_state: 'rest'" in line
-    assert "sine_01" in line
+    said = " ".join(result.stdout.split())
+    assert "start at rest away from their balance" in said
+    assert "sine_01" in said
     # The cache alters nothing of it.
-    assert re.findall(r"^hwid: .*", again().stderr, re.M) == [line]
+    assert " ".join(again().stdout.split()).split(" done in")[0] in said
     edit("max_effects: 1}", "max_effects: 1, initial_state: held}")
-    assert "hwid: " not in again().stderr
+    assert "away from their balance" not in again().stdout

@@ -1,97 +1,24 @@
-"""Recordings that a diagnosis would start in an equilibrium that they were not in."""
+"""Recordings whose rest a cut takes away, or that it begins in motion."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hwid_cli.config.load import load_experiment
-from hwid_cli.records.drive import Controller
 from hwid_cli.records.experiment import CalibrateOptions, DiagnoseOptions
-from hwid_cli.records.recordings import RawRecording, Recording
+from hwid_cli.records.recordings import RawRecording
 from hwid_cli.stages.calibrate import calibrate_all
 from hwid_cli.stages.diagnosis_starts import (
     moving_sentence,
     moving_starts,
-    starts_sentence,
-    unsettled_starts,
     with_rests,
 )
-from tests.blind.campaign import measured_case
-from tests.blind.cases import make_case
-from tests.blind.machine import SAMPLE_TIME_S
-from tests.blind.nuisances import NUISANCES
-from tests.cli.drive_examples import NOISE, STEP_S, currents, displacement
+from tests.cli.drive_examples import NOISE, STEP_S, displacement
 from tests.diagnosis.small_drive import simulation
+from tests.diagnosis.test_found_start import LEAD_IN, with_lead_in
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 REST = DiagnoseOptions()
-LEAD_IN = 100
-
-
-def with_lead_in(*, cut, level=0.0, zero=0.0):
-    """Sines after a rest, the rest cut off or not, and a step that keeps its own."""
-    rng = np.random.default_rng(1)
-    found = []
-    for name, current in currents():
-        current = np.r_[np.zeros(LEAD_IN), current] + level
-        output = displacement(current - level) + simulation_gain() * level + zero
-        output += NOISE * rng.standard_normal(current.size)
-        # As calibration does it: from the first sample that is clearly away.
-        first = LEAD_IN + 2 if cut and name.startswith("sine") else 0
-        kind = name.split("_")[0]
-        found.append(
-            Recording(name, current[first:], output[first:], STEP_S, kind=kind)
-        )
-    return found
-
-
-def simulation_gain():
-    return simulation().force_constant_N_per_A / simulation().stiffness_N_per_m
-
-
-def test_sines_that_were_cut_at_their_onset_do_not_start_in_equilibrium():
-    found = unsettled_starts(with_lead_in(cut=True), simulation(), REST)
-    assert found == ("sine_01", "sine_02", "sine_03", "sine_04")
-
-
-def test_parameters_that_are_off_alter_nothing():
-    wrong = simulation(force_constant_N_per_A=6.0, stiffness_N_per_m=1000.0)
-    assert len(unsettled_starts(with_lead_in(cut=True), wrong, REST)) == 4
-    assert unsettled_starts(with_lead_in(cut=False), wrong, REST) == ()
-
-
-@pytest.mark.parametrize(("level", "zero"), [(0.0, 0.0), (0.8, 0.0), (0.0, 1e-3)])
-def test_what_keeps_its_rest_starts_in_equilibrium(level, zero):
-    found = with_lead_in(cut=False, level=level, zero=zero)
-    assert unsettled_starts(found, simulation(), REST) == ()
-
-
-@pytest.mark.parametrize("rule", ["held", "estimated"])
-def test_a_start_that_is_fitted_is_never_doubtful(rule):
-    options = DiagnoseOptions(initial_state=rule)
-    assert unsettled_starts(with_lead_in(cut=True), simulation(), options) == ()
-
-
-def test_a_controller_and_a_free_axis_are_not_judged():
-    found = with_lead_in(cut=True)
-    ruled = simulation(controller=Controller(20.0, 30.0))
-    assert unsettled_starts(found, ruled, REST) == ()
-    assert unsettled_starts(found, simulation(stiffness_N_per_m=0.0), REST) == ()
-
-
-def test_the_sentence_is_one_line_with_the_remedies():
-    found = with_lead_in(cut=True)
-    names = unsettled_starts(found, simulation(), REST)
-    text = starts_sentence(names, found, CalibrateOptions(sine=("cut",)))
-
-    assert "\n" not in text
-    for words in ("sine_01", "'held'", "'estimated'", "'cut' out of calibrate.sine"):
-        assert words in text
-    assert "calibrate" not in starts_sentence(names, found, None)
-    assert "and 1 more begin within" in starts_sentence(["a"] * 5, found, None)
-    assert starts_sentence((), found, None) == ""
 
 
 def random_after_a_rest():
@@ -179,41 +106,3 @@ def test_what_was_cut_in_mid_motion_or_not_at_all_stays_as_it_is():
     whole, logs = calibrate_all(sines_after_a_rest(), CalibrateOptions())[:2]
     assert with_rests(whole, logs) == list(whole)
     assert with_rests(whole, ()) == list(whole)
-
-
-def blind_cases():
-    """What may make a start look odd: a load, friction, noise of all kinds, offsets."""
-    for effect in ("coulomb_friction", "constant_load", "output_backlash"):
-        yield make_case("full", (effect,), 0, plan="short")
-    for nuisance in NUISANCES:
-        yield make_case("nuisance", (), 0, plan="short", nuisance=nuisance)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize(
-    "case",
-    [
-        pytest.param(case, id=case.name, marks=pytest.mark.slow if row % 2 else ())
-        for row, case in enumerate(blind_cases())
-    ],
-)
-def test_no_case_of_the_blind_test_is_doubted(case):
-    measured, truth = measured_case(case)
-    found = [
-        Recording(one.name, one.current_A, one.displacement_m, SAMPLE_TIME_S)
-        for one in measured
-    ]
-    given = simulation(**truth["simulation"])
-    assert unsettled_starts(found, given, REST) == ()
-    # Not by luck: without their rest the sines would be.
-    cut = [
-        replace(one, input=one.input[108:], output=one.output[108:]) for one in found
-    ]
-    assert unsettled_starts(cut, given, REST) != ()
-
-
-def test_the_demo_fits_how_its_recordings_start():
-    demo = load_experiment(CONFIGS / "diagnose_demo.yaml")
-    cut = with_lead_in(cut=True)
-    assert unsettled_starts(cut, simulation(), REST) != ()
-    assert unsettled_starts(cut, demo.simulation, demo.diagnose) == ()
