@@ -23,10 +23,10 @@ _MOST_BRIDGED = 0.01
 _LONGEST_BRIDGE = 10
 # Instruments send 9.9E37 for overflow and 9.91E37 for no number (SCPI 1999, 7.2.1).
 _NO_NUMBER, _NO_MORE = 9.9e37, 1e38
-# Loggers write these, where they are farther from the others than this many times these
-# reach (LAS 2.0 has -999.25 in its header).
+# Loggers write these, where they are farther from the others than these reach,
+# this many times (LAS 2.0 has -999.25 in its header).
 _CODES = (-999.0, -999.25, -9999.0, -9999.25, -99999.0, -999999.0, 9999.0, 99999.0)
-_FAR = 2.0
+_FAR = 1.0
 
 
 def missing(column: MeasuredColumn) -> np.ndarray:

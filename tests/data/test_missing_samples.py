@@ -77,3 +77,15 @@ def test_only_one_sample_out_of_range_is_bridged():
 
     assert bridge_missing("run.csv", one)[1] == {"output": (7,)}
     assert bridge_missing("run.csv", two)[1] == {}
+
+
+@pytest.mark.parametrize(
+    ("usual", "code", "is_none"),
+    [(2800.0, -9999.0, True), (2800.0, 9999.0, True), (6000.0, -9999.0, False)],
+)
+def test_a_number_far_from_all_others_is_a_loggers_word_for_none(usual, code, is_none):
+    output = usual * np.sin(np.arange(500) / 40.0)
+    output[[120, 300]] = code
+    found, places = bridge_missing("run.csv", columns(output))
+    assert places == ({"output": (120, 300)} if is_none else {})
+    assert (float(np.abs(found.output.values).max()) < 1.01 * usual) is is_none

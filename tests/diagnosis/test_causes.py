@@ -9,9 +9,12 @@ from scipy.signal import lfilter
 from hwid_cli.diagnosis.causes import (
     left_over,
     whiteness_but_for_neighbours,
+    without_damage,
     without_repeats,
 )
+from hwid_cli.diagnosis.sentences import left_out
 from hwid_cli.diagnosis.whiteness import whiteness
+from hwid_cli.records.drive import Controller
 from tests.diagnosis.small_drive import (
     NOISE,
     STEP_S,
@@ -146,3 +149,30 @@ def test_noise_that_is_linked_otherwise_is_something(of, taps):
 def test_where_the_noise_is_coloured_already_nothing_is_linked():
     coloured = replace(white(), is_coloured=True, whitening=(1.0, -0.3))
     assert whiteness_but_for_neighbours(linked(1), coloured) == np.inf
+
+
+def test_samples_that_stand_out_alone_do_not_count():
+    (given, *_) = recordings()
+    output, current = given.output.copy(), given.input.copy()
+    output[[90, 213]] += 40 * NOISE
+    current[300] += 5.0
+    quiet = recordings()[1]
+    found = without_damage(
+        problem([replace(given, output=output, input=current), quiet])
+    )
+    one, other = found.signals
+    np.testing.assert_array_equal(np.setdiff1d(np.arange(N), one.evaluated), [90, 213])
+    assert (found.n_damaged, found.damaged) == (2, (given.name,))
+    np.testing.assert_allclose(one.driven_by, given.input, atol=0.05)
+    assert other.n_evaluated == N
+    assert left_out(found)[0].startswith(f"2 samples of {given.name} stand out alone")
+    assert left_out(without_damage(problem([quiet]))) == ()
+
+
+def test_under_a_controller_damage_is_in_the_command_and_counts():
+    (given, *_) = recordings()
+    current = given.input.copy()
+    current[300] += 5.0
+    given = replace(given, input=current, reference=given.output)
+    of = problem([given], controller=Controller(20.0, 30.0))
+    assert without_damage(of) is of

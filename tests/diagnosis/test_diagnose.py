@@ -156,3 +156,9 @@ def test_where_nothing_is_missing_no_recording_is_odd(monkeypatch):
     options = DiagnoseOptions(effects=("coulomb_friction",))
     found = diagnose(recordings(), simulation(), options, in_turn, lambda what, n: None)
     assert found.verdict == "none"
+
+
+def test_a_hum_has_a_phase_in_each_of_two_recordings_and_parameters_do_not_differ():
+    few = allowed_effects(problem(recordings()[:2]), DiagnoseOptions())
+    assert {"sensor_hum", "periodic_force"} <= set(few)
+    assert not any(one.startswith("parameter_change") for one in few)

@@ -125,3 +125,18 @@ def test_a_strength_that_ran_to_its_bound_imitates(share, at_bound):
 def test_a_base_has_no_bound_to_run_to():
     given = problem(recordings())
     assert not runs_to_bound(given, fit(given), sizes(problem()))
+
+
+def test_what_the_simulation_has_of_a_law_may_be_all_of_its_strength():
+    """The excess at rest alone tells Stribeck friction from the simulation's own."""
+    plain = {"coulomb_friction": {"force_N": 0.5}}
+    given = problem(recordings({"stribeck_friction": STRIBECK}), effects=plain)
+    scales = sizes(problem())
+    start = {"force_N": 1e-7, "static_excess_N": 0.4, "velocity_m_per_s": 0.02}
+    found = fit(given, {"stribeck_friction": start}, scales=scales)
+    none = found.names.index(ParameterRef("stribeck_friction", "force_N"))
+    assert found.values[none] < 1e-3
+    assert unclear_effects(given, found, scales) == ()
+    # Of its own strength nothing is said.
+    low, high = intervals(given, found, scales)
+    assert np.isnan([low[none], high[none]]).all()

@@ -625,6 +625,22 @@ def test_a_small_effect_is_needed_that_takes_much_down_to_nearly_noise(
 
 
 @pytest.mark.parametrize(
+    ("without", "whiteness", "is_both"),
+    # The second effect brings 0.005 %: from 19 times the noise to nothing but noise, or
+    # to what is not white, and from 2.6 times.
+    [(36_100.0, 0.4, True), (36_100.0, 2.0, False), (676.0, 0.4, False)],
+)
+def test_beside_a_huge_effect_a_second_one_is_needed_that_leaves_noise(
+    without, whiteness, is_both
+):
+    one = made_up(("gravity",), without, whiteness=2000.0)
+    both = made_up(("gravity", "input_delay"), 105.0, whiteness=whiteness)
+    start = base(7.2e8 if without > 1e4 else 1.2e7)
+    verdict = decided(start, [one, both], [one, both], given=7.2e8)
+    assert verdict.chosen is (both if is_both else one)
+
+
+@pytest.mark.parametrize(
     ("first", "with_both", "whiteness", "is_both"),
     [
         # From 2.2 to 1.3 times the noise, 3 % of all: enough beside a limit, not beside

@@ -206,3 +206,21 @@ def test_levels_that_go_with_the_input_stay_beside_recordings_that_begin_in_moti
     found = propose([*steps, raw("random_1", 100.0 * levels(3))])
     assert found.recipes["step"] == ("cut",)
     assert "goes with the input, and stays" in found.recipe_reason
+
+
+def battery(name, charge, seed):
+    """Pulses of a current after a rest, and a cell's voltage, which depends on its charge."""
+    rng = np.random.default_rng(seed)
+    current = np.r_[np.zeros(60), np.repeat(rng.uniform(-5.0, 8.0, 12), 40)]
+    voltage = 3.2 + charge - 0.03 * current - 1e-5 * np.cumsum(current)
+    return RawRecording(name, current, voltage + 1e-3 * rng.normal(size=540), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("charges", "is_own"), [((0.2, 0.5, 0.7, 0.9), True), ((0.5,) * 4, False)]
+)
+def test_a_level_that_the_input_does_not_say_is_subtracted(charges, is_own):
+    found = propose([battery(f"run_{n}", one, n) for n, one in enumerate(charges)])
+    subtracts = {"output_offset" in recipe for recipe in found.recipes.values()}
+    assert subtracts == {is_own}
+    assert ("other levels under one input" in found.recipe_reason) is is_own
