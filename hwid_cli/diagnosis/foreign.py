@@ -42,7 +42,7 @@ from hwid_cli.records.programs import SimulatorRun, StandInChange
 from hwid_cli.records.recordings import Recording
 
 # Searches, each from where the last one has moved the parameters by more than this.
-_MOST_SEARCHES = 3
+MOST_SEARCHES = 3
 _MOVED = 0.01
 # Verdicts that a law may take the place of.
 _NAMED = ("named", "ambiguous")
@@ -144,8 +144,8 @@ def _searched(
     # parameters are fitted with them.
     given_sse = None if simulator.is_extended else _sse(problem.signals, begun.given)
     kept: _Search | None = None
-    for count in range(_MOST_SEARCHES):
-        is_last = count == _MOST_SEARCHES - 1
+    for count in range(MOST_SEARCHES):
+        is_last = count == MOST_SEARCHES - 1
         standing = standing_beside(runs, problem, given, values)
         found, moved, is_confirmed = _found(
             standing, options, (runs, values), on_round, given_sse, is_first=count == 0
@@ -163,7 +163,7 @@ def _searched(
             break
         # Parameters that imitated what is missing have led elsewhere; or to where nothing
         # holds in the simulation: the given ones have imitated nothing yet.
-        is_in_vain = count == _MOST_SEARCHES - 2 and not is_confirmed
+        is_in_vain = count == MOST_SEARCHES - 2 and not is_confirmed
         following = dict(simulator.values) if is_in_vain else moved
         if not have_moved(values, following, _MOVED):
             break

@@ -16,7 +16,7 @@ from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.simulation_checks import SIMULATION_EXAMPLE
 from hwid_cli.diagnosis import diagnose as pipeline
 from hwid_cli.diagnosis.direction import ReversedInputError, reversal_sentence
-from hwid_cli.diagnosis.foreign import diagnose_foreign
+from hwid_cli.diagnosis.foreign import MOST_SEARCHES, diagnose_foreign
 from hwid_cli.diagnosis.hidden import HiddenEffect
 from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.errors import CacheError, ConfigError
@@ -595,6 +595,9 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         n,
         given.options.max_effects,
         planning.workers,
+        searches=1
+        if isinstance(given.simulation, SimulationOptions)
+        else MOST_SEARCHES,
     )
     what = f"{counted(n, 'recording')} x {counted(found.n_tasks, 'effect')}"
     if found.by_runs:
@@ -602,6 +605,8 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     elif not found.n_tasks:
         what = f"{counted(n, 'recording')}; no effect is looked for"
     why = "one effect is not enough"
+    if not isinstance(given.simulation, SimulationOptions):
+        why += " and the search is repeated beside other parameters"
     if given.options.laws != "never":
         why += ", several times that if no effect is and laws are searched for"
     return (

@@ -117,7 +117,12 @@ class DiagnosisTime:
 
 
 def time_diagnosis(
-    diagnose: Diagnose, n_recordings: int, max_effects: int, workers: int
+    diagnose: Diagnose,
+    n_recordings: int,
+    max_effects: int,
+    workers: int,
+    *,
+    searches: int = 1,
 ) -> DiagnosisTime:
     """Time the beginning of a diagnosis, and count the rounds that may follow.
 
@@ -130,6 +135,8 @@ def time_diagnosis(
         Of the largest set that is searched for.
     workers : int, [-]
         Processes that share its rounds.
+    searches : int, [-]
+        Most that follow each other, beside parameters that the last one has moved.
     """
     sampler = _Sampler()
     start = time.process_time()
@@ -151,7 +158,7 @@ def time_diagnosis(
     running = (sampler.run_seconds + confirming) / workers
     fixed = spent + running + LOADING_SECONDS + _FIGURES_S
     single = _SINGLE_EFFECTS * sampler.screening / _gain(sampler.n_tasks, workers)
-    rounds = 1 + MOST_SCREENINGS
+    rounds = searches * (1 + MOST_SCREENINGS)
     most = rounds * single * (1.0 + _sets_for_one(sampler.n_tasks, max_effects))
     most += (most_confirming - confirming) / workers
     return DiagnosisTime(fixed + single, fixed + most, sampler.n_tasks)

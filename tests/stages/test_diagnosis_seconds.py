@@ -115,3 +115,14 @@ def test_a_round_of_few_tasks_gains_little_from_several_processes(clock):
     # Five tasks on two processes take as long as three; a fifth is lost besides.
     assert alone.seconds == pytest.approx(1.2 * 2.5 + 0.6 + 0.7)
     assert shared.seconds == pytest.approx(1.2 * 1.5 / 0.8 + 0.6 + 0.7)
+
+
+def test_searches_that_follow_each_other_are_the_longer_end(clock):
+    def diagnose(run, on_round):
+        on_round("single effects, screening", 40)
+        run([task(clock, 0.5) for _ in range(40)], keep=True)
+
+    one, three = (time_diagnosis(diagnose, 6, 1, 1, searches=most) for most in (1, 3))
+    assert three.seconds == one.seconds
+    single = one.seconds - 0.6 - 0.7
+    assert three.most_seconds - one.most_seconds == pytest.approx(6 * single)
