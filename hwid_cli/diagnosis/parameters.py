@@ -35,6 +35,8 @@ _SMALL_DAMPING = 0.02
 # Damping over mass in a sample, at most: the drive then follows within a tenth of one, and
 # what is faster looks alike and takes hundreds of steps.
 _FASTEST_PER_SAMPLE = 10.0
+# A stand-in that is faster from the first may have so many times its damping.
+_ROOM_OF_STAND_IN = 10.0
 # Stands for zero where a value has a logarithm, as a share of its size.
 _NOTHING = 1e-9
 
@@ -229,7 +231,8 @@ def _base_unknowns(
     """Coordinates of the base; a spring that is not there stays away.
 
     What is known moves within its tolerance, or is no coordinate at all. Damping makes
-    the drive no faster than the recordings show; a stand-in sees to that by its mass.
+    the drive no faster than the recordings show; a stand-in may be so from the first, for
+    a simulation without a mass, and then has room of its own.
     """
     fastest = _FASTEST_PER_SAMPLE * drive.mass_kg / sample_time_s
     unknowns = []
@@ -246,9 +249,9 @@ def _base_unknowns(
         low, high = (
             (1e-4 * size, 1e4 * size) if value > 0 else (-1e4 * size, -1e-4 * size)
         )
-        is_free = name == "damping_N_s_per_m" and not isinstance(drive, StandIn)
-        if is_free and value > 0:
-            high = max(min(high, fastest), size)
+        if name == "damping_N_s_per_m" and value > 0:
+            room = _ROOM_OF_STAND_IN if isinstance(drive, StandIn) else 1.0
+            high = max(min(high, fastest), room * size)
         if name in known:
             reach = known[name] * size
             low, high = max(low, value - reach), min(high, value + reach)
