@@ -2,7 +2,7 @@
 
 A recording that begins while the machine turns, or at rest where friction has left it, is
 off from its first sample beside a simulation that starts in balance; effects would be
-blamed for that. docs/method_diagnosis.md, eq. (D18a).
+blamed for that. docs/method_diagnosis.md, eq. (D28d).
 """
 
 from dataclasses import replace
