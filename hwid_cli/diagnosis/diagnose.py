@@ -18,6 +18,7 @@ from hwid_cli.diagnosis.base_fit import (
     fitted_from,
     with_free_resistance,
 )
+from hwid_cli.diagnosis.behind_loop import unseen_in_command
 from hwid_cli.diagnosis.candidate import (
     Baseline,
     compared_with_fit,
@@ -82,6 +83,11 @@ from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.own_effects import own_ids
 from hwid_cli.records.recordings import Recording
 
+_BEHIND_INPUT = (
+    "compared is the output behind the logged input: in the controller's command hardly "
+    "anything of this shows"
+)
+
 
 def diagnose(
     recordings: Sequence[Recording],
@@ -102,7 +108,16 @@ def diagnose(
         Called with what begins and its number of tasks.
     """
     problem = _problem(recordings, simulation, options)
-    return describe(find(problem, options, run_tasks, on_round))
+    found = find(problem, options, run_tasks, on_round)
+    chosen = found.verdict.chosen
+    if chosen.effects or not unseen_in_command(problem, chosen, found.scales):
+        return describe(found)
+    # The machine has answered to the logged input, whatever has asked for it.
+    problem = _problem(recordings, replace(simulation, controller=None), options)
+    behind = find(problem, options, run_tasks, on_round)
+    if not behind.verdict.chosen.effects:
+        return describe(found)
+    return describe(replace(behind, warnings=(*behind.warnings, _BEHIND_INPUT)))
 
 
 def _problem(
