@@ -35,8 +35,9 @@ _SMALL_DAMPING = 0.02
 # Damping over mass in a sample, at most: the drive then follows within a tenth of one, and
 # what is faster looks alike and takes hundreds of steps.
 _FASTEST_PER_SAMPLE = 10.0
-# A stand-in that is faster from the first may have so many times its damping.
-_ROOM_OF_STAND_IN = 10.0
+# A stand-in whose base has moved by a larger factor is that of another simulation, and may
+# be so fast that effects on it take minutes.
+_FARTHEST_OF_STAND_IN = 10.0
 # Stands for zero where a value has a logarithm, as a share of its size.
 _NOTHING = 1e-9
 
@@ -231,8 +232,7 @@ def _base_unknowns(
     """Coordinates of the base; a spring that is not there stays away.
 
     What is known moves within its tolerance, or is no coordinate at all. Damping makes
-    the drive no faster than the recordings show; a stand-in may be so from the first, for
-    a simulation without a mass, and then has room of its own.
+    the drive no faster than the recordings show; a stand-in sees to that by its mass.
     """
     fastest = _FASTEST_PER_SAMPLE * drive.mass_kg / sample_time_s
     unknowns = []
@@ -249,14 +249,27 @@ def _base_unknowns(
         low, high = (
             (1e-4 * size, 1e4 * size) if value > 0 else (-1e4 * size, -1e-4 * size)
         )
-        if name == "damping_N_s_per_m" and value > 0:
-            room = _ROOM_OF_STAND_IN if isinstance(drive, StandIn) else 1.0
-            high = max(min(high, fastest), room * size)
+        if isinstance(drive, StandIn):
+            low, high = _near(drive, name, value)
+        elif name == "damping_N_s_per_m" and value > 0:
+            high = max(min(high, fastest), size)
         if name in known:
             reach = known[name] * size
             low, high = max(low, value - reach), min(high, value + reach)
         unknowns.append(Unknown(BASE, name, True, value, low, high))
     return unknowns
+
+
+def _near(drive: StandIn, name: str, value: float) -> tuple[float, float]:
+    """Bounds of what a stand-in's base may become: it is still that of its simulation.
+
+    Damping may be next to none, and so its factor anything up to that of no overshoot.
+    """
+    low, high = sorted((value / _FARTHEST_OF_STAND_IN, value * _FARTHEST_OF_STAND_IN))
+    if name == "damping_N_s_per_m" and value > 0:
+        none = 2.0 * np.sqrt(max(drive.stiffness_N_per_m, 0.0) * drive.mass_kg)
+        low, high = 1e-4 * value, max(high, none)
+    return low, high
 
 
 def _unknown(owner: str, parameter: Parameter, value: float, scales: Scales) -> Unknown:
