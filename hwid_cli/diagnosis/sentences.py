@@ -281,11 +281,12 @@ def untold_command(problem: DiagnosisProblem, is_untold: bool) -> tuple[str, ...
 
 
 def _rest(criteria: SelectionCriteria, verdict: DiagnosisVerdict) -> str:
-    """Say what remains beside what was found; nothing where it is complete."""
+    """Say what remains beside what was found; nothing where that is noise of the output."""
+    is_more = criteria.ratio(verdict.chosen) > SMALL_REMAINDER
+    if verdict.chosen.cause and (is_more or not verdict.is_complete):
+        return f" What remains is {CAUSES[verdict.chosen.cause]}."
     if verdict.is_complete:
         return ""
-    if verdict.chosen.cause:
-        return f" What remains is {CAUSES[verdict.chosen.cause]}."
     if criteria.ratio(verdict.chosen) > STILL_LARGE:
         return " What remains is not explained."
     if criteria.ratio(verdict.chosen) > SMALL_REMAINDER:

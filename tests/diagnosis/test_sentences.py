@@ -46,6 +46,21 @@ def test_the_rest_is_called_what_it_is(word, times_the_noise, is_complete, said)
     assert _rest(CRITERIA, verdict) == said
 
 
+@pytest.mark.parametrize(
+    ("times_the_noise", "said"),
+    [
+        (1.6, " What remains is noise of the measured input, seen through the drive."),
+        (1.1, ""),
+    ],
+)
+def test_more_than_the_outputs_noise_is_called_what_it_is_where_all_is_found(
+    times_the_noise, said
+):
+    fit = made_up(("coulomb_friction",), 100.0 * times_the_noise**2)
+    fit = replace(fit, cause="input_noise")
+    assert _rest(CRITERIA, DiagnosisVerdict("named", True, fit, ())) == said
+
+
 def delayed(delay_s):
     value = FittedParameter("delay_s", delay_s)
     return FittedEffect("input_delay", "acts later", "i(t - td)", (value,))
