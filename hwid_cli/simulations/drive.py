@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hwid_cli.diagnosis.base_fit import compared_as_given
-from hwid_cli.diagnosis.causes import without_repeats
+from hwid_cli.diagnosis.causes import without_damage, without_repeats
+from hwid_cli.diagnosis.found_start import with_found_start
 from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.drive import DriveResponse
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -35,6 +36,7 @@ def simulate_recordings(
     """
     # As a diagnosis does: its numbers are those of the simulation that it writes.
     problem = without_repeats(prepare(recordings, simulation, options, ()))
+    problem = with_found_start(without_damage(problem))
     return tuple(
         DriveResponse(
             one.signals.name,
