@@ -416,3 +416,12 @@ def test_minutes_and_hours_behind_a_name_of_time(title, unit):
 
 def test_the_least_of_something_is_no_time():
     assert unit_in_name("speed_min", "time") == ""
+
+
+def test_a_coarse_current_that_answers_to_a_voltage_does_not_drive_it():
+    rng = np.random.default_rng(8)
+    voltage = np.repeat(rng.uniform(-6, 6, 40), 40) + rng.normal(0, 0.05, 1600)
+    current = np.zeros(1600)
+    for row in range(1, 1600):
+        current[row] = current[row - 1] + (voltage[row - 1] - current[row - 1]) / 30
+    assert guessed(("U", voltage), ("I", np.round(current)))[:2] == ("U", "I")

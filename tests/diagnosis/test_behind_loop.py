@@ -1,11 +1,13 @@
 """Outputs that differ although the command of a controller agrees."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hwid_cli.diagnosis import behind_loop
+from hwid_cli.diagnosis import diagnose as pipeline
 from hwid_cli.diagnosis.diagnose import diagnose
 from hwid_cli.records.drive import Controller
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -110,3 +112,31 @@ def test_what_a_command_does_not_show_is_looked_for_behind_it():
     assert (found.verdict, found.compared) == ("named", "output y")
     assert [one.id for one in found.effects] == ["parameter_change"]
     assert any("behind the logged input" in one for one in found.warnings)
+
+
+@pytest.mark.parametrize(
+    ("behind", "taken"), [(("gravity",), "behind"), ((), "command")]
+)
+def test_the_command_has_the_last_word_where_nothing_shows_behind_it(
+    monkeypatch, behind, taken
+):
+    @dataclass
+    class Found:
+        name: str
+        effects: tuple
+        warnings: tuple = ()
+        scales = None
+
+        @property
+        def verdict(self):
+            return SimpleNamespace(chosen=SimpleNamespace(effects=self.effects))
+
+    found = iter([Found("command", ()), Found("behind", behind)])
+    for name, fake in (
+        ("_problem", lambda *_: None),
+        ("find", lambda *_: next(found)),
+        ("unseen_in_command", lambda *_: ("move_2",)),
+        ("describe", lambda one: one),
+    ):
+        monkeypatch.setattr(pipeline, name, fake)
+    assert diagnose((), SimulationOptions(mass_kg=1.0), None, None, None).name == taken

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy
 
+from hwid_cli.diagnosis.diagnose import diagnose
 from hwid_cli.diagnosis.found_start import with_found_start
 from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.drive import Controller
@@ -16,7 +17,7 @@ from tests.blind.cases import make_case
 from tests.blind.machine import SAMPLE_TIME_S
 from tests.blind.nuisances import NUISANCES
 from tests.cli.drive_examples import NOISE, STEP_S, currents, displacement
-from tests.diagnosis.small_drive import simulation
+from tests.diagnosis.small_drive import in_turn, simulation
 
 REST = DiagnoseOptions()
 LEAD_IN = 100
@@ -79,13 +80,13 @@ def test_a_controller_and_a_free_axis_are_not_judged():
     assert found(cut, simulation(stiffness_N_per_m=0.0)) == ("rest", ())
 
 
-def held_by_friction(starts, *, noise=2e-6, seed=1):
+def held_by_friction(starts, *, noise=2e-6, seed=1, fine=20):
     """A mass on a spring whose friction holds it where it starts, by another integrator.
 
     Half a second of rest, then a step that it follows.
     """
     mass, damping, stiffness, gain, friction = 0.6, 5.5, 2400.0, 14.0, 0.9
-    step, fine = 1e-3, 20
+    step = 1e-3
     rng = np.random.default_rng(seed)
     recordings = []
     for row, start in enumerate(starts):
@@ -141,6 +142,7 @@ def turning(speed, *, noise=0.2, seed=2):
     return volts, angle, speeds + noise * rng.standard_normal(time.size)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("output", ["velocity", "position"])
 def test_what_turns_at_first_starts_in_motion(output):
     given = simulation(
@@ -188,3 +190,20 @@ def test_no_case_of_the_blind_test_is_doubted(case):
         for one in recordings
     ]
     assert found(cut, given)[0] != "rest"
+
+
+def test_rests_at_several_levels_of_the_input_tell_parameters_and_no_start():
+    low, high = (with_lead_in(cut=False, level=one) for one in (-0.8, 0.8))
+    wrong = simulation(force_constant_N_per_A=6.0, stiffness_N_per_m=1000.0)
+    assert found([*low[:4], *high[4:]], wrong) == ("rest", ())
+
+
+@pytest.mark.thorough
+def test_a_clean_stage_that_friction_has_left_elsewhere_lacks_nothing():
+    recordings = held_by_friction((3e-4, 1e-4, -2.5e-4, 0.0), fine=200)
+    told = diagnose(
+        recordings, stage(hold="zero"), DiagnoseOptions(effects=("spring_preload",)),
+        in_turn, lambda *_: None,
+    )  # fmt: skip
+    assert told.verdict == "parameters"
+    assert any("start at rest away from their balance" in one for one in told.warnings)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -224,3 +226,22 @@ def test_a_level_that_the_input_does_not_say_is_subtracted(charges, is_own):
     subtracts = {"output_offset" in recipe for recipe in found.recipes.values()}
     assert subtracts == {is_own}
     assert ("other levels under one input" in found.recipe_reason) is is_own
+
+
+def test_levels_stay_where_some_rest_under_another_input():
+    apart = [battery(f"run_{n}", one, n) for n, one in enumerate((0.2, 0.5, 0.7))]
+    driven = battery("run_3", 0.5, 3)
+    driven = replace(driven, input=driven.input + 4.0)
+    found = propose([*apart, driven])
+    assert not any("output_offset" in recipe for recipe in found.recipes.values())
+
+
+def test_recipes_that_subtract_levels_already_say_so_themselves():
+    steps = []
+    for row, level in enumerate((0.0, 0.4, 0.9)):
+        current = np.r_[np.zeros(100), np.full(400, 1.0 + row)]
+        output = level + np.convolve(current, np.ones(20) / 20)[:500]
+        steps.append(RawRecording(f"step_{row}", current, output, 1e-3))
+    found = propose(steps)
+    assert "output_offset" in found.recipes["step"]
+    assert found.recipe_reason.startswith("tried: step")
