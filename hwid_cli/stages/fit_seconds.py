@@ -35,6 +35,8 @@ _LEAST_SAMPLES = 1000
 MEASURED = FitCost(0.055, 2000, 3.0, 10, "the table in docs/benchmarks.md")
 # A fit of so many samples stays below two seconds on a slow machine, [samples].
 _MOST_TIMED = 10_000
+# Recordings of a joint fit that are timed.
+_MOST_JOINED = 6
 # Time of a grid's fit against that of one alone from nothing: in the rounds in which fits
 # are searched for too, in the later ones, and both for groups that begin with the models
 # of their members (docs/benchmarks.md, "A campaign" and "Groups of recordings"), [-].
@@ -109,6 +111,39 @@ def time_fits(
         f"{middle.nk}",
         rounds=tuple(sum(times) / len(each) for times in zip(*each, strict=True)),
     )
+
+
+def joint_seconds(
+    recordings: Sequence[Recording], orders: Orders, options: FitOptions
+) -> float:
+    """Time of a fit of several recordings together on one core, measured.
+
+    The mean of fits with both maps, with that of the output, and without, the first or the
+    last recording left out: how often one is searched again depends on the recordings more
+    than on their length.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        At least one; few of them, and parts of long ones, stand for all.
+
+    Returns
+    -------
+    float, [s]
+    """
+    parts = [_livelier_part(one) for one in recordings[:_MOST_JOINED]]
+    no_input = replace(options, input_map="none")
+    kinds = (options, no_input, replace(no_input, output_map="none"))
+    # The first call loads the compiled loops, which no later fit does.
+    fit(parts[:1], orders, replace(kinds[-1], starts=1, max_iterations=1))
+    folds = (parts[:-1], parts[1:]) if len(parts) > 1 else (parts,)
+    start = time.process_time()
+    for one in kinds:
+        for fold in folds:
+            fit(fold, orders, one)
+    seconds = time.process_time() - start
+    timed = len(kinds) * sum(one.n_samples for fold in folds for one in fold)
+    return seconds * sum(one.n_samples for one in recordings) / timed
 
 
 def _one_of_each_kind(recordings: Sequence[Recording]) -> list[Recording]:

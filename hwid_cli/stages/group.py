@@ -16,7 +16,7 @@ import numpy as np
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import CrossvalOptions, GroupOptions
 from hwid_cli.records.groups import GroupSearch
-from hwid_cli.records.recordings import Calibrated
+from hwid_cli.records.recordings import Calibrated, Recording
 from hwid_cli.report.groups import chain_table, join_table, levels_table
 from hwid_cli.report.table import Block
 from hwid_cli.stages.fit_seconds import (
@@ -26,6 +26,7 @@ from hwid_cli.stages.fit_seconds import (
     TASK_SECONDS,
     fit_seconds,
     group_grid_seconds,
+    joint_seconds,
     middle_orders,
 )
 from hwid_cli.stages.group_levels import NAME, STAGE_VERSION, GroupPlan, search_all
@@ -198,7 +199,7 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     of_levels = _seconds_of_levels(planning, n, n_validate, bounds)
     fits = sum(bounds) * n_orders
     what = f"at most {sum(bounds)} groups ({' + '.join(map(str, bounds))}), {fits} fits"
-    together = _seconds_together(planning, n, n_candidates)
+    together = _seconds_together(planning, usable, n_candidates)
     if together is not None:
         more, seconds = together
         what = f"one group of all, about {more} fits" + (f"; {what}" if fits else "")
@@ -238,7 +239,7 @@ def _seconds_of_levels(
 
 
 def _seconds_together(
-    planning: Planning, n_samples: int, n_candidates: int
+    planning: Planning, usable: Sequence[Recording], n_candidates: int
 ) -> tuple[int, float] | None:
     """Number of fits of the group of all and their time; None where none is asked for."""
     experiment = planning.experiment
@@ -246,14 +247,17 @@ def _seconds_together(
         return None
     orders = candidate_orders(experiment.orders)
     count = most_fits(experiment.fit, n_candidates, len(orders))
-    each = fit_seconds(
-        planning.cost,
-        middle_orders(experiment.orders),
-        n_samples,
-        units=min(experiment.fit.units, FEW_UNITS),
-        n_recordings=n_candidates - 1,
-    )
-    return count, count * (_ANEW * each + TASK_SECONDS) / planning.workers
+    middle = middle_orders(experiment.orders)
+    units = min(experiment.fit.units, FEW_UNITS)
+    if planning.cost.rounds:
+        options = replace(experiment.fit, units=units)
+        each = joint_seconds(usable, middle, options)
+    else:
+        n_samples = int(np.median([one.n_samples for one in usable]))
+        each = _ANEW * fit_seconds(
+            planning.cost, middle, n_samples, units=units, n_recordings=n_candidates - 1
+        )
+    return count, count * (each + TASK_SECONDS) / planning.workers
 
 
 STAGE = Stage(
