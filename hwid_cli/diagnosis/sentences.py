@@ -307,9 +307,7 @@ def _where_it_sits(
     rows = _rows_of_gap(excess, [one.kind for one in signals])
     if not rows:
         return ""
-    shown = ", ".join(signals[row].name for row in rows[:_MOST_NAMED])
-    more = len(rows) - _MOST_NAMED
-    shown += f" and {more} more" if more > 0 else ""
+    shown = _few([signals[row].name for row in rows])
     text = f" Nearly all of the gap sits in {shown}"
     if all(went_another_way(signals[row], excess[row]) for row in rows):
         # A pendulum over the top: one run more or less tells nothing of the machine.
