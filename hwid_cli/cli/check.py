@@ -5,6 +5,7 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import nullcontext, redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -25,6 +26,7 @@ from hwid_cli.records.recordings import Calibrated
 from hwid_cli.report.check import check_document, recordings_table, stages_table
 from hwid_cli.report.table import as_text
 from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_fits
+from hwid_cli.stages.joint_seconds import time_joint_fits
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.recording_facts import Checked, check_recordings
 from hwid_cli.stages.run_seconds import page_plan, with_start
@@ -193,7 +195,8 @@ def _cost(experiment: Experiment, checked: Checked, *, timing: bool) -> FitCost:
     ):
         click.echo("\nThe first run compiles its loops: about 20 s more, once.")
         return MEASURED
-    return time_fits(checked.recordings, experiment.orders, experiment.fit)
+    found = time_fits(checked.recordings, experiment.orders, experiment.fit)
+    return replace(found, joint=time_joint_fits(experiment, checked.recordings))
 
 
 def _end_with(problems: tuple[str, ...]) -> NoReturn:

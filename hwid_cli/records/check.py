@@ -95,6 +95,9 @@ class FitCost:
     rounds : tuple of float, [s]
         Of a fit in the grid's first round, in a round that is searched anew, and in a
         later one, timed on the recordings themselves; empty where they were not.
+    joint : tuple of float, [s]
+        Of a fit of all recordings together, with each of the maps that are tried, and of a
+        linear one; empty where they were not timed.
     """
 
     seconds: float
@@ -103,3 +106,4 @@ class FitCost:
     units: int
     source: str
     rounds: tuple[float, ...] = ()
+    joint: tuple[float, ...] = ()

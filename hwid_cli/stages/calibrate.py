@@ -201,8 +201,6 @@ def _finish(draft: Draft) -> tuple[Recording, CalibrationLog]:
     return recording, replace(log, removed=removed_samples(raw, log))
 
 
-# Drawing a recording before and after, [s].
-_DRAWING_S = 0.15
 # Measured on the demo: a sample, the figures of a recording, the page, [bytes].
 _SAMPLE_BYTES, _FIGURE_BYTES, _PAGE_BYTES = 16, 80e3, 4e6
 
@@ -299,8 +297,7 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     samples = sum(one.n_samples for one in planning.recordings)
     what = f"{counted(n, 'recording')}, {counted(samples, 'sample')}"
     size = _SAMPLE_BYTES * samples + _FIGURE_BYTES * n + _PAGE_BYTES
-    seconds = planning.reading_seconds + _DRAWING_S * n
-    return (StagePlan(NAME, what, n, None, seconds, size),)
+    return (StagePlan(NAME, what, n, None, planning.reading_seconds, size),)
 
 
 STAGE = Stage(

@@ -35,14 +35,13 @@ _LEAST_SAMPLES = 1000
 MEASURED = FitCost(0.055, 2000, 3.0, 10, "the table in docs/benchmarks.md")
 # A fit of so many samples stays below two seconds on a slow machine, [samples].
 _MOST_TIMED = 10_000
-# Recordings of a joint fit that are timed.
-_MOST_JOINED = 6
 # Time of a grid's fit against that of one alone from nothing: in the rounds in which fits
 # are searched for too, in the later ones, and both for groups that begin with the models
 # of their members (docs/benchmarks.md, "A campaign" and "Groups of recordings"), [-].
 _SEARCHED, _CONTINUED, _WARM_SEARCHED, _WARM_CONTINUED = 0.5, 0.2, 0.25, 0.1
-# So many fits of maps that are compared are timed, [-].
-_TIMED_MAPS = 5
+# So many fits of maps that are compared are timed, on as many recordings at most: whether a
+# fit is searched again depends on the recording more than on the maps, [-].
+_TIMED_MAPS, _TIMED_RECORDINGS = 5, 10
 # Keeping the result of a task, [s].
 TASK_SECONDS = 0.005
 # Simulating one model on one sample, its initial state included (docs/benchmarks.md: 1 ms
@@ -113,39 +112,6 @@ def time_fits(
     )
 
 
-def joint_seconds(
-    recordings: Sequence[Recording], orders: Orders, options: FitOptions
-) -> float:
-    """Time of a fit of several recordings together on one core, measured.
-
-    The mean of fits with both maps, with that of the output, and without, the first or the
-    last recording left out: how often one is searched again depends on the recordings more
-    than on their length.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        At least one; few of them, and parts of long ones, stand for all.
-
-    Returns
-    -------
-    float, [s]
-    """
-    parts = [_livelier_part(one) for one in recordings[:_MOST_JOINED]]
-    no_input = replace(options, input_map="none")
-    kinds = (options, no_input, replace(no_input, output_map="none"))
-    # The first call loads the compiled loops, which no later fit does.
-    fit(parts[:1], orders, replace(kinds[-1], starts=1, max_iterations=1))
-    folds = (parts[:-1], parts[1:]) if len(parts) > 1 else (parts,)
-    start = time.process_time()
-    for one in kinds:
-        for fold in folds:
-            fit(fold, orders, one)
-    seconds = time.process_time() - start
-    timed = len(kinds) * sum(one.n_samples for fold in folds for one in fold)
-    return seconds * sum(one.n_samples for one in recordings) / timed
-
-
 def _one_of_each_kind(recordings: Sequence[Recording]) -> list[Recording]:
     """The recording of middle length of each kind, at most so long as is worth timing."""
     by_length = sorted(recordings, key=lambda one: one.n_samples)
@@ -155,12 +121,18 @@ def _one_of_each_kind(recordings: Sequence[Recording]) -> list[Recording]:
     groups.sort(key=len, reverse=True)
     found = []
     for group in groups:
-        found.append(_livelier_part(group[len(group) // 2]))
+        found.append(livelier_part(group[len(group) // 2]))
     return found
 
 
-def _livelier_part(whole: Recording) -> Recording:
-    """As many samples as are timed, from where the input moves: a rest is fitted at once."""
+def livelier_part(whole: Recording) -> Recording:
+    """As many samples as are timed, from where the input moves: a rest is fitted at once.
+
+    Returns
+    -------
+    Recording
+        The same one where it is short.
+    """
     n = min(whole.n_samples, _MOST_TIMED)
     # Of the first or the last samples, and of those between.
     firsts = range(0, whole.n_samples - n + 1, max(n // 4, 1))
@@ -346,8 +318,8 @@ def map_seconds(
 ) -> float:
     """Time of fits with several pairs of maps on one core; their orders are not known yet.
 
-    Where fits are timed, so are some of these, each on a recording of its own: how often
-    one is searched again depends on both.
+    Where fits are timed, so are five to ten of these, each with the next recording and the
+    next maps.
 
     Returns
     -------
@@ -365,9 +337,13 @@ def map_seconds(
             for one in recordings
             for options in maps
         )
+    timed = recordings[:: math.ceil(len(recordings) / _TIMED_RECORDINGS)]
+    n_timed = min(max(_TIMED_MAPS, len(timed)), len(maps))
     each = [
-        _seconds_per_work(recordings[number % len(recordings)], middle, options)
-        for number, options in enumerate(maps[:: math.ceil(len(maps) / _TIMED_MAPS)])
+        _seconds_per_work(
+            timed[number % len(timed)], middle, maps[number * len(maps) // n_timed]
+        )
+        for number in range(n_timed)
     ]
     works = [_work(one.n_samples) for one in recordings]
     return sum(each) / len(each) * sum(works) * len(maps)
@@ -377,7 +353,7 @@ def _seconds_per_work(
     recording: Recording, orders: Orders, options: FitOptions
 ) -> float:
     """Time a fit, as a part of what a recording of its length is to take."""
-    part = _livelier_part(recording)
+    part = livelier_part(recording)
     start = time.process_time()
     fit([part], orders, replace(options, join=FitOptions().join))
     return (time.process_time() - start) / _work(part.n_samples)

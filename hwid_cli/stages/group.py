@@ -16,7 +16,7 @@ import numpy as np
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import CrossvalOptions, GroupOptions
 from hwid_cli.records.groups import GroupSearch
-from hwid_cli.records.recordings import Calibrated, Recording
+from hwid_cli.records.recordings import Calibrated
 from hwid_cli.report.groups import chain_table, join_table, levels_table
 from hwid_cli.report.table import Block
 from hwid_cli.stages.fit_seconds import (
@@ -24,17 +24,14 @@ from hwid_cli.stages.fit_seconds import (
     PAIR_BYTES,
     SECONDS_PER_SIMULATED_SAMPLE,
     TASK_SECONDS,
-    fit_seconds,
     group_grid_seconds,
-    joint_seconds,
-    middle_orders,
 )
 from hwid_cli.stages.group_levels import NAME, STAGE_VERSION, GroupPlan, search_all
 from hwid_cli.stages.identify import Run
+from hwid_cli.stages.joint_seconds import joint_plan
 from hwid_cli.stages.order_grid import candidate_orders
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
-from hwid_cli.stages.together import FEW_UNITS, most_fits
 from hwid_cli.store.group_results import read_group, write_group, write_groups_csv
 from hwid_cli.tasks.cache import Store, recording_key, task_key
 from hwid_cli.tasks.runner import TaskDone, run_tasks
@@ -139,10 +136,6 @@ def group_bound(
     return tuple(counts)
 
 
-# A fit that no smaller one leads to, over one that it does, [-].
-_ANEW = 2.5
-
-
 class _NotStoredError(Exception):
     """A search asks for what the cache does not have."""
 
@@ -199,21 +192,23 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     of_levels = _seconds_of_levels(planning, n, n_validate, bounds)
     fits = sum(bounds) * n_orders
     what = f"at most {sum(bounds)} groups ({' + '.join(map(str, bounds))}), {fits} fits"
-    together = _seconds_together(planning, usable, n_candidates)
+    together = joint_plan(experiment, planning.recordings, planning.cost)
+    more, least, most = 0, 0.0, 0.0
+    reasons = ["the search goes on to the last level"] if fits else []
     if together is not None:
-        more, seconds = together
+        more = together.n_fits
+        least, most = (one / planning.workers for one in together.search)
         what = f"one group of all, about {more} fits" + (f"; {what}" if fits else "")
-    else:
-        more, seconds = 0, 0.0
+        reasons.append("the maps that fit slowest are chosen")
     plan = StagePlan(
         NAME,
         what,
         fits + more,
         None,
-        sum(of_levels[:1]) + seconds,
+        sum(of_levels[:1]) + least,
         FIT_BYTES * (fits + more) + PAIR_BYTES * sum(bounds) * n_validate,
-        sum(of_levels) + seconds,
-        "the search goes on to the last level" if fits else "",
+        sum(of_levels) + most,
+        " and ".join(reasons),
         is_shared=True,
     )
     return (plan,)
@@ -236,28 +231,6 @@ def _seconds_of_levels(
         / planning.workers
         for level, count in enumerate(bounds, start=2)
     ]
-
-
-def _seconds_together(
-    planning: Planning, usable: Sequence[Recording], n_candidates: int
-) -> tuple[int, float] | None:
-    """Number of fits of the group of all and their time; None where none is asked for."""
-    experiment = planning.experiment
-    if not (experiment.group or GroupOptions()).together or n_candidates < 2:
-        return None
-    orders = candidate_orders(experiment.orders)
-    count = most_fits(experiment.fit, n_candidates, len(orders))
-    middle = middle_orders(experiment.orders)
-    units = min(experiment.fit.units, FEW_UNITS)
-    if planning.cost.rounds:
-        options = replace(experiment.fit, units=units)
-        each = joint_seconds(usable, middle, options)
-    else:
-        n_samples = int(np.median([one.n_samples for one in usable]))
-        each = _ANEW * fit_seconds(
-            planning.cost, middle, n_samples, units=units, n_recordings=n_candidates - 1
-        )
-    return count, count * (each + TASK_SECONDS) / planning.workers
 
 
 STAGE = Stage(

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from hwid_cli.records.check import StagePlan
 from hwid_cli.stages.fit_seconds import grid_seconds
+from hwid_cli.stages.joint_seconds import joint_plan
 from hwid_cli.stages.stage import Planning
 
 # Reading the compiled loops of what the first tasks need, and starting processes that do
@@ -16,7 +17,7 @@ LOADING_SECONDS, _START_SECONDS = 0.6, 1.6
 # Writing the page, and drawing its figures for each recording, [s].
 _PAGE_SECONDS, _FIGURES_SECONDS = 0.8, 0.35
 # A grid of linear models, each fitted from nothing, against that of a recording with maps:
-# 0.2 to 0.7 for a model of one recording, 1.5 for one of three (demo, HSM150), [-].
+# 0.2 to 0.7 (demo, HSM150), [-].
 _LINEAR_SHARE = 0.7
 
 
@@ -31,7 +32,13 @@ def page_plan(planning: Planning) -> StagePlan:
 
 
 def _linear_seconds(planning: Planning) -> float:
-    """Time of the grid of linear models beside the model to take, of a typical recording."""
+    """Time of the grid of linear models beside the model to take.
+
+    Of all recordings together where such a model is asked for, else of a typical one.
+    """
+    found = joint_plan(planning.experiment, planning.recordings, planning.cost)
+    if found is not None:
+        return found.linear / planning.workers
     by_length = sorted(planning.recordings, key=lambda one: one.n_samples)
     if not by_length:
         return 0.0

@@ -39,6 +39,7 @@ from hwid_cli.stages.fit_seconds import (
     middle_orders,
 )
 from hwid_cli.stages.identify import recording_key, recordings_with_models
+from hwid_cli.stages.joint_seconds import joint_plan
 from hwid_cli.stages.predictions import predict_all
 from hwid_cli.stages.ranking import best_of_each, score_models
 from hwid_cli.stages.selection import select_recordings
@@ -450,19 +451,18 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     experiment, n = planning.experiment, len(planning.recordings)
     used = recordings_with_models(planning.recordings, experiment)
     # Nothing but parts of a single recording can judge how far its model is right.
-    seconds = (
-        PARTS
-        * fit_seconds(
-            planning.cost,
-            middle_orders(experiment.orders),
-            used[0].n_samples,
-            units=experiment.fit.units,
-        )
-        if len(used) == 1
-        else TASK_SECONDS * n
-    )
+    least = most = TASK_SECONDS * n
+    reason = ""
+    if len(used) == 1:
+        orders, units = middle_orders(experiment.orders), experiment.fit.units
+        each = fit_seconds(planning.cost, orders, used[0].n_samples, units=units)
+        least = most = PARTS * each
+    elif together := joint_plan(experiment, planning.recordings, planning.cost):
+        # One task: its fits are not shared.
+        least, most = (least + one for one in together.bands)
+        reason = "the maps that fit slowest are chosen"
     what, size = counted(n, "recording"), n * PAIR_BYTES
-    return (StagePlan(NAME, what, n, None, seconds, size),)
+    return (StagePlan(NAME, what, n, None, least, size, most, reason),)
 
 
 STAGE = Stage(

@@ -47,6 +47,8 @@ _AS_CLOSE = 0.02
 # By how much a model has to come closer that remembers its start for longer than recordings
 # last, [-]: no new recording tells such a start, unless the machine itself is like that.
 _WORTH_LASTING = 1.5
+# Fits of all recordings that try longer delays, where any of them asks for one.
+LONGER_DELAYS_FITS = MOST_DELAY + 1
 # How far off counts at most, over the standard deviation of the output, [-]: a model that
 # is worse than a constant is no worse for being far worse.
 _FARTHEST = 3.0
@@ -162,9 +164,8 @@ def most_fits(options: FitOptions, n_recordings: int, n_orders: int) -> int:
     102
     """
     candidates = len(_USUAL) * len(kinds_tried(options)) + 2 + n_orders
-    # The best maps were fitted at one pair of orders before; a longer delay is a candidate
-    # more, and each is tried by a fit of all recordings.
-    return candidates * len(folds_of(n_recordings)) + 1 + MOST_DELAY + 1
+    # A longer delay is a candidate more.
+    return candidates * len(folds_of(n_recordings)) + 1 + LONGER_DELAYS_FITS
 
 
 def fit_together(

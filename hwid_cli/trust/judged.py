@@ -46,7 +46,7 @@ _LEAST_SCALE = 1.0
 # Standard deviations where nothing judges.
 _UNKNOWN_SCALE = 2.0
 # Recordings that judge; more change little and cost time.
-_MOST_JUDGES = 8
+MOST_JUDGES = 8
 # Standard deviations of a model that diverges.
 _DIVERGED = 1e12
 # Share of the largest output below which an error is none: that of a noise-free fit.
@@ -98,7 +98,7 @@ def model_trust(
     """
     trust = own_trust(fit, own)
     if others and fit.model is not None:
-        at = np.linspace(0, len(others) - 1, min(len(others), _MOST_JUDGES))
+        at = np.linspace(0, len(others) - 1, min(len(others), MOST_JUDGES))
         found = [judgement(fit.model, trust, others[round(place)]) for place in at]
     else:
         found = left_out(fit, own)
@@ -326,7 +326,7 @@ def left_out(fit: Fit, own: Sequence[Recording]) -> list[Judgement]:
         # Parts begin in the middle of a motion, whatever the recording does.
         options = replace(options, join="experiments", initial_state="estimated")
     found = []
-    for left in own[:_MOST_JUDGES]:
+    for left in own[:MOST_JUDGES]:
         kept = [one for one in own if one is not left]
         other = fit_without_standard_errors(kept, fit.orders, options)
         if other.model is not None:
