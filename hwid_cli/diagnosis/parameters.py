@@ -351,8 +351,12 @@ def drive_at(
 def drives_at(
     problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
 ) -> list[Drive]:
-    """Drive of each recording, with the base of a point and what it changes of that."""
+    """Drive of each recording, with the base and the effects of a point.
+
+    Of what each recording has for itself, only what multiplies the base is in it.
+    """
     drive = drive_at(problem, fit_layout, point)
+    drive = replace(drive, effects=effects_at(fit_layout, point))
     changes = [
         (column, one, _changed_by(one))
         for column, one in enumerate(fit_layout.own)

@@ -14,7 +14,7 @@ import scipy
 
 from hwid_cli.compiled import INNER, compiled
 from hwid_cli.diagnosis.problem import Signals
-from hwid_cli.drive.simulation import push_and_damping
+from hwid_cli.drive.linear import has_inner_states, linear_equations
 from hwid_cli.drive.springs import stiffness_at
 from hwid_cli.records.drive import HELD, Drive
 
@@ -269,16 +269,19 @@ def noisy_drives(
     drives : sequence of Drive
         Of each recording, with the fitted base.
     """
-    straight: dict[tuple[int, float], StraightDrive] = {}
+    straight: dict[tuple[int, float, float], StraightDrive] = {}
     found: list[NoisyDrive] = []
     for drive, one in zip(drives, signals, strict=True):
         stiffness = stiffness_at(drive, one.position[one.evaluated])
-        if np.ptp(stiffness) > _ONE_SPRING * abs(float(np.mean(stiffness))):
+        mean = float(np.mean(stiffness))
+        is_curved = np.ptp(stiffness) > _ONE_SPRING * abs(mean)
+        if is_curved and not has_inner_states(drive):
             found.append(_curved(drive, one.sample_time_s, stiffness))
             continue
-        kind = id(drive), one.sample_time_s
+        spring = mean if is_curved else drive.stiffness_N_per_m
+        kind = id(drive), one.sample_time_s, spring
         if kind not in straight:
-            straight[kind] = straight_drive(drive, one.sample_time_s)
+            straight[kind] = straight_drive(drive, one.sample_time_s, spring)
         found.append(straight[kind])
     return found
 
@@ -305,22 +308,21 @@ def straight_drive(
         In place of the drive's own; below 0 where a spring gives way, as a pendulum's
         beyond a quarter turn.
     """
-    push, damping = push_and_damping(drive)
-    spring = drive.stiffness_N_per_m if stiffness is None else stiffness
+    change, push, reading = linear_equations(drive, stiffness)
+    n = push.size
     # State, input, and its slope.
-    block = np.zeros((4, 4))
-    block[0, 1] = 1.0
-    block[1, :3] = np.array([-spring, -damping, push]) / drive.mass_kg
-    block[2, 3] = 1.0 / sample_time_s
+    block = np.zeros((n + 2, n + 2))
+    block[:n, :n], block[:n, n] = change, push
+    block[n, n + 1] = 1.0 / sample_time_s
     step = scipy.linalg.expm(block * sample_time_s)
-    a, rising = step[:2, :2], step[:2, 3]
+    a, rising = step[:n, :n], step[:n, n + 1]
     if drive.hold == HELD:
-        rising = np.zeros(2)
-    falling = step[:2, 2] - rising
-    is_velocity = drive.output == "velocity"
-    c = np.array([[0.0, 1.0]]) if is_velocity else np.array([[1.0, 0.0]])
+        rising = np.zeros(n)
+    falling = step[:n, n] - rising
+    c = reading[None, :]
     b, through = a @ rising + falling, float((c @ rising)[0])
-    if is_velocity and spring == 0:
+    is_told = np.any(change != 0.0, axis=0) | (reading != 0.0)
+    if not is_told[0]:
         # Nothing tells where it is.
         return StraightDrive(a[1:, 1:], b[1:], c[:, 1:], through)
     return StraightDrive(a, b, c, through)

@@ -392,6 +392,8 @@ class Effect:
         What it states in words for this one of several entries with one public id.
     is_possible : callable or None
         Whether values make sense together, where bounds of each alone do not say it.
+    is_linear : bool
+        Whether it is a linear system with states of its own.
     beside : str
         Id of the entry of which this is the second one; without that it means nothing.
     formula : Formula or None
@@ -416,6 +418,7 @@ class Effect:
     is_rugged: bool = False
     bounces: bool = False
     moves_at_rest: bool = False
+    is_linear: bool = False
     strength: str = ""
     size: Callable[[Values, Scales], float] | None = None
     told_by: str = ""

@@ -39,6 +39,7 @@ INDUCTANCE = Effect(
         "input_delay": "a voltage far above the natural frequency",
     },
     needs_circuit=True,
+    is_linear=True,
 )
 
 EFFECTS = (INDUCTANCE,)

@@ -118,6 +118,7 @@ LAG = Effect(
         "winding_inductance": "fast motion without voltage, such as after a release",
     },
     unseen=_OF_SENSOR,
+    is_linear=True,
 )
 
 SECOND_ORDER_LAG = Effect(
@@ -136,6 +137,7 @@ SECOND_ORDER_LAG = Effect(
         "elastic_coupling": "a sensor at the motor beside that at the load",
     },
     unseen=_OF_SENSOR,
+    is_linear=True,
 )
 
 CONSTANT_SATURATION = Effect(

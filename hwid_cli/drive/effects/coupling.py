@@ -159,6 +159,7 @@ MODE = Effect(
     ),
     derived={"MODE_STIFFNESS": _mode_stiffness, "MODE_DAMPING": _mode_damping},
     confused_with={"input_delay": "a multisine over the whole band"},
+    is_linear=True,
 )
 
 PERIODIC = Effect(
@@ -247,6 +248,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
         confused_with=looks_like,
         # A motor without an inertia of its own is a lag.
         told_by="motor_share",
+        is_linear=True,
     )
 
 

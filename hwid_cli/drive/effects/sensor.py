@@ -257,6 +257,7 @@ LAG = Effect(
         "actuator_lag": "large and small motions, where the drive is not linear",
         "input_delay": "a sine far above the natural frequency",
     },
+    is_linear=True,
 )
 
 SECOND_ORDER_LAG = Effect(
@@ -270,6 +271,7 @@ SECOND_ORDER_LAG = Effect(
     ),
     contains=("sensor_lag", "actuator_lag:second_order", "actuator_lag"),
     confused_with=dict(LAG.confused_with),
+    is_linear=True,
 )
 
 EFFECTS = (
