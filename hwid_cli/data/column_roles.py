@@ -25,6 +25,7 @@ from hwid_cli.data.column_words import (
     VOLTAGE,
     Meaning,
     counts_recordings,
+    is_uncalibrated,
     may_drive,
     meaning_of,
     place_in_chain,
@@ -234,6 +235,8 @@ def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
     if inputs and outputs:
         first, reason = _chosen_input(inputs, outputs[0])
         last, why = _chosen_output(first, outputs)
+        others = [one for one in (*outputs, *inputs) if one not in (first, last)]
+        last, why = _that_answers(first, last, why, others)
         return first, last, {"input": reason, "output": why}
     free = [one for one in named if not one.meaning.role]
     if inputs and free:
@@ -310,11 +313,35 @@ def _chosen_output(first: _Named, outputs: list[_Named]) -> tuple[_Named, str]:
     meant = [one for one in outputs if one.meaning.rank <= OF_UNIT] or outputs
     together = [one for one in meant if one.meaning.rest == first.meaning.rest]
     chosen = together or meant
+    known = [one for one in chosen if not _is_uncalibrated(one)]
+    if known and known[0] is not chosen[0]:
+        title = chosen[0].column.title
+        return known[0], f"{_by(known[0])}; {title!r} is not calibrated"
     settled = [one for one in chosen if not signs.runs_away(one.values)]
     if settled and settled[0] is not chosen[0]:
         title = chosen[0].column.title
         return settled[0], f"by its name; {title!r} runs away in one direction"
     return chosen[0], _by(chosen[0])
+
+
+def _that_answers(
+    first: _Named, last: _Named, why: str, others: list[_Named]
+) -> tuple[_Named, str]:
+    """The output, unless it has nothing to do with the input and another column has.
+
+    The speed of a brake that is turned at a constant one, beside its torque.
+    """
+    if not signs.are_unrelated(first.values, last.values):
+        return last, why
+    for other in others:
+        if _answer(first, other) > _CLEAR:
+            said = f"{_called(last.column)} has nothing to do with the input"
+            return other, f"{_by(other)}; {said}"
+    return last, why
+
+
+def _is_uncalibrated(one: _Named) -> bool:
+    return is_uncalibrated(one.column.title, one.meaning.unit)
 
 
 def _along_chain(

@@ -194,6 +194,14 @@ _OUTPUT_UNITS = {
 }
 # Words that name a plug of an instrument and not a quantity, and units that do say it.
 _PLUGS = {"in", "input", "eingang", "out", "output", "ausgang", "amp"}
+# A light source shines on a process or measures a distance: the unit says which.
+_SOURCES_OR_SENSORS = {"laser", "led"}
+# What leaves one of these drives the machine: amp out.
+_AMPLIFIERS = {
+    *("amp", "amplifier", "verstärker", "verstaerker", "generator", "gen", "awg", "dac"),
+}
+# Words and units of numbers that nobody has calibrated.
+_UNCALIBRATED = {"raw", "counts", "count", "cts", "adc", "lsb", "digits", "ticks"}
 _CURRENT_UNITS = {"a", "ma", "ka"}
 # What drives, wherever it is plugged in; a voltage may be that of any sensor.
 _DRIVING_UNITS = {*_CURRENT_UNITS, "n", "kn", "nm", "n m", "mnm"}
@@ -308,6 +316,8 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
         role, rank = "output", OF_UNIT + len(_HARDLY_MEANT)
     elif unit and (not role or _is_contradicted(role, used, unit)):
         role, rank, used = _role_of_unit(unit), OF_UNIT, ""
+    elif used in _PLUGS and _AMPLIFIERS & set(words):
+        role, rank, used = "input", _INPUT.index("amp"), "amp"
     is_wanted = any(word in _WANTED and word != used for word in words)
     if is_reference or is_wanted:
         # A wanted current is what drives the machine; a wanted position is no output.
@@ -326,6 +336,17 @@ def counts_recordings(title: str) -> bool:
     (True, True, False)
     """
     return any(word in _RECORDINGS for word in _words(title))
+
+
+def is_uncalibrated(title: str, unit: str) -> bool:
+    """Whether a name or a unit says that numbers are those of a converter.
+
+    Examples
+    --------
+    >>> is_uncalibrated("Level1 [raw]", ""), is_uncalibrated("level", "cm")
+    (True, False)
+    """
+    return bool(_UNCALIBRATED & {unit.lower(), *_words(title)})
 
 
 def may_drive(meaning: Meaning) -> bool:
@@ -355,7 +376,8 @@ def _is_contradicted(role: str, word: str, unit: str) -> bool:
     says = "input" if unit.lower() in _DRIVING_UNITS and unit != "nm" else ""
     says = "output" if unit.lower() in _OUTPUT_UNITS else says
     # A letter stands for many things; what is measured in A is none of them but a current.
-    return (word in _PLUGS or len(word) == 1) and says not in ("", role)
+    may_be_either = word in _PLUGS or word in _SOURCES_OR_SENSORS or len(word) == 1
+    return may_be_either and says not in ("", role)
 
 
 def _is_temperature(words: list[str], unit: str) -> bool:

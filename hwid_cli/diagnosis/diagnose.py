@@ -48,6 +48,11 @@ from hwid_cli.diagnosis.next_experiment import (
     undecided_candidates,
     with_best_lead,
 )
+from hwid_cli.diagnosis.noise_filter import (
+    FilteredTasks,
+    filtered_sentence,
+    with_noise_filter,
+)
 from hwid_cli.diagnosis.odd_recordings import with_odd_ones_trained
 from hwid_cli.diagnosis.parameters import each_sum_of_squares
 from hwid_cli.diagnosis.pieces_search import (
@@ -77,7 +82,7 @@ from hwid_cli.diagnosis.whiteness import whiteness
 from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.diagnosis import STILL_LARGE, Diagnosis
 from hwid_cli.records.drive import LINE
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.own_effects import own_ids
@@ -287,6 +292,26 @@ def find(
     ConfigError
         If the output clearly moves against the input.
     """
+    searched = _held_or_not(problem, options, run_tasks, on_round, given_sse)
+    behind = _behind_noise_filter(searched, options)
+    if behind is not None:
+        return behind
+    if may_cut:
+        searched = _with_pieces(searched, options.max_effects)
+    whole = _judged(searched, options)
+    if whole.pieces is not None or whole.law is not None:
+        return whole
+    return replace(whole, other=other_command(searched.rounds, whole.verdict.chosen))
+
+
+def _held_or_not(
+    problem: DiagnosisProblem,
+    options: DiagnoseOptions,
+    run_tasks: RunTasks,
+    on_round: OnRound,
+    given_sse: np.ndarray | None,
+) -> "_Searched":
+    """What is found beside a command in straight lines, or beside a held one."""
     searched = _searched(problem, options, run_tasks, on_round, given_sse)
     rounds, found = searched.rounds, searched.found
     if problem.may_be_held and searched.has_gap and is_held(rounds, found):
@@ -295,12 +320,38 @@ def find(
         best = best_of(again.rounds, again.found)
         if does_as_well(rounds, best, best_of(rounds, found)):
             searched = again
-    if may_cut:
-        searched = _with_pieces(searched, options.max_effects)
-    whole = _judged(searched, options)
-    if whole.pieces is not None or whole.law is not None:
-        return whole
-    return replace(whole, other=other_command(searched.rounds, whole.verdict.chosen))
+    return searched
+
+
+def _behind_noise_filter(
+    searched: "_Searched", options: DiagnoseOptions
+) -> Findings | None:
+    """What a second look finds where noise of the input hides what is missing.
+
+    None where it is not needed, or settles nothing either.
+    """
+    rounds, criteria = searched.rounds, searched.rounds.criteria
+    if not searched.has_gap or criteria.standing is not None:
+        return None
+    verdict = decided(rounds, searched.given_sse, searched.found)
+    if verdict.is_complete or criteria.ratio(verdict.chosen) <= STILL_LARGE:
+        return None
+    noise = rounds.baseline.noise
+    problem = with_noise_filter(rounds.problem, rounds.baseline.drive, noise)
+    if problem is None:
+        return None
+    rounds.on_round("behind a filter for noise of the input", 0)
+    run_tasks = FilteredTasks(rounds.run_tasks, problem)
+    again = _searched(problem, options, run_tasks, rounds.on_round, None)
+    told = _judged(again, replace(options, laws="never"))
+    left = told.criteria.ratio(told.verdict.chosen)
+    if told.verdict.word == "unknown" or left > STILL_LARGE:
+        return None
+    sentence = filtered_sentence(
+        told.criteria.noise, noise.input_rms, rounds.problem.input_unit
+    )
+    floor = replace(told.criteria.noise, sentence=sentence)
+    return replace(told, criteria=replace(told.criteria, noise=floor))
 
 
 @dataclass(frozen=True, eq=False)
@@ -417,7 +468,9 @@ def _beside(
     before = compared_with_fit(problem, base, fitted.scales)
     force = latent_force(before, drive, noise)
     if given_sse is None:
-        given_sse = each_sum_of_squares([one.residual for one in fitted.given])
+        given_sse = each_sum_of_squares(
+            [one.signals.filtered(one.residual) for one in fitted.given]
+        )
     rounds = Rounds(
         problem,
         Baseline(drive, fitted.scales, noise, problem.drive),

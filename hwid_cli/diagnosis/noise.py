@@ -98,7 +98,7 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
     sentence = noise_sentence(found, method, resolution, unit)
     return NoiseFloor(
         float(found.rms), method, resolution, found.is_coloured, found.whitening,
-        sentence, _input_rms(problem),
+        sentence, 0.0 if problem.is_filtered else _input_rms(problem),
     )  # fmt: skip
 
 

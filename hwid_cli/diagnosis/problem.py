@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 import scipy
 
+from hwid_cli.diagnosis.innovations import StationaryFilter
 from hwid_cli.drive.simulation import NO_FORCE, refined
 from hwid_cli.records.axis import base_of, name_inside
 from hwid_cli.records.drive import LINE, SOURCES, UNSAID_HOLD, WINDING, Drive
@@ -81,6 +82,8 @@ class Signals:
     pushes : ndarray, shape (n_samples, n_free) or (0, 0), [N]
         Forces that move such a drive as parameters of that simulation do, each by about
         the noise; what is fitted beside them is as uncertain as they leave it.
+    noise_filter : StationaryFilter or None
+        Takes out of what a simulation leaves what noise of the input has done.
     """
 
     name: str
@@ -99,6 +102,7 @@ class Signals:
     offset: np.ndarray | None = None
     own_start: tuple[float, float] | None = None
     pushes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+    noise_filter: StationaryFilter | None = None
 
     @cached_property
     def position(self) -> np.ndarray:
@@ -120,6 +124,17 @@ class Signals:
     def seen(self, motion: HasMotion) -> np.ndarray:
         """What a sensor without effects shows of a motion, [output unit]."""
         return motion.velocity if self.is_velocity else motion.position
+
+    def filtered(self, residual: np.ndarray) -> np.ndarray:
+        """What a simulation leaves, behind the filter where there is one.
+
+        Parameters
+        ----------
+        residual : ndarray, shape (n_evaluated,), [output unit]
+        """
+        if self.noise_filter is None:
+            return residual
+        return self.noise_filter(residual).values
 
     @cached_property
     def finely_driven_by(self) -> np.ndarray:
@@ -235,6 +250,11 @@ class DiagnosisProblem:
     def compares_command(self) -> bool:
         """Whether the command is compared instead of the output."""
         return self.drive.controller is not None
+
+    @property
+    def is_filtered(self) -> bool:
+        """Whether noise of the input is taken out of what a simulation leaves."""
+        return any(one.noise_filter is not None for one in self.signals)
 
     @property
     def has_starts(self) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 
 from hwid_cli.compiled import INNER, compiled
+from hwid_cli.diagnosis.innovations import Innovations, StationaryFilter
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.drive.linear import has_inner_states, linear_equations
 from hwid_cli.drive.springs import stiffness_at
@@ -22,22 +23,6 @@ from hwid_cli.records.drive import HELD, Drive
 _ONE_SPRING = 0.01
 # A curved one is found between so many.
 _N_SPRINGS = 32
-
-
-@dataclass(frozen=True, eq=False)
-class Innovations:
-    """What the samples before do not tell of a residual.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n_samples,)
-        Over their own deviation, in units of the output's noise.
-    log_variances : float
-        Sum of the logarithms of their variances, in the same units.
-    """
-
-    values: np.ndarray
-    log_variances: float
 
 
 # a, b and through of several springs.
@@ -102,7 +87,7 @@ class StraightDrive:
         except (np.linalg.LinAlgError, ValueError):
             return None
 
-    def whitening(self, strength: float) -> Whitening | None:
+    def whitening(self, strength: float) -> StationaryFilter | None:
         """From a residual to its innovations; None without a filter."""
         covariance = self.covariance(strength)
         if covariance is None:
@@ -111,14 +96,7 @@ class StraightDrive:
         both = strength * through * self.b[:, None]
         variance = float((c @ covariance @ c.T)[0, 0]) + 1.0 + strength * through**2
         correct = ((a @ covariance @ c.T + both) / variance).ravel()
-        top, bottom = np.poly(a), np.poly(a - np.outer(correct, c))
-
-        def innovations(residual: np.ndarray) -> Innovations:
-            found = np.asarray(scipy.signal.lfilter(top, bottom, residual))
-            logs = residual.size * float(np.log(variance))
-            return Innovations(found / np.sqrt(variance), logs)
-
-        return innovations
+        return StationaryFilter(np.poly(a), np.poly(a - np.outer(correct, c)), variance)
 
     def moved(self, size: int) -> tuple[float, float]:
         """Mean square of the reading that noise of variance 1 makes from rest."""

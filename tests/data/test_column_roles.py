@@ -425,3 +425,37 @@ def test_a_coarse_current_that_answers_to_a_voltage_does_not_drive_it():
     for row in range(1, 1600):
         current[row] = current[row - 1] + (voltage[row - 1] - current[row - 1]) / 30
     assert guessed(("U", voltage), ("I", np.round(current)))[:2] == ("U", "I")
+
+
+def test_an_amplifiers_output_drives_and_a_laser_in_mm_measures():
+    first, last, _ = guessed(
+        ("amp_out", VOLTAGE, "Volts"), ("laser", POSITION, "mm"), ("mic", SPEED, "Pa")
+    )
+    assert (first, last) == ("amp_out", "laser")
+    # A laser that is driven by a voltage is an input still.
+    first, last, _ = guessed(("laser", VOLTAGE, "V"), ("temperature", POSITION, "K"))
+    assert (first, last) == ("laser", "temperature")
+
+
+def test_what_is_calibrated_comes_before_raw_numbers():
+    first, last, found = guessed(
+        ("Pump [V]", VOLTAGE), ("Level1 [raw]", SPEED), ("Level2 [cm]", POSITION)
+    )
+    assert (first, last) == ("Pump [V]", "Level2 [cm]")
+    assert "'Level1 [raw]' is not calibrated" in found.reasons["output"]
+
+
+def test_an_output_that_has_nothing_to_do_with_the_input_gives_way():
+    rng = np.random.default_rng(5)
+    steady = 300.0 + rng.normal(size=N)
+    first, last, found = guessed(
+        ("Strom", VOLTAGE, "A"), ("Drehzahl", steady, "1/min"), ("Moment", SPEED, "Nm")
+    )
+    assert (first, last) == ("Strom", "Moment")
+    assert "'Drehzahl' has nothing to do with the input" in found.reasons["output"]
+    # Where no other column answers, the name holds.
+    other = rng.normal(size=N)
+    first, last, _ = guessed(
+        ("Strom", VOLTAGE, "A"), ("Drehzahl", steady, "1/min"), ("Moment", other, "Nm")
+    )
+    assert (first, last) == ("Strom", "Drehzahl")
