@@ -30,7 +30,7 @@ from hwid_cli.diagnosis.selection import (
     names_of,
     rivals,
 )
-from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import SMALL_REMAINDER, STILL_LARGE
 
@@ -41,6 +41,8 @@ LEAST_OF_RIVALS = 0.35
 NEAR_BEST, LEAST_SHARING = 2.0, 10
 # An effect is the only one for a rest if so many others were tried in its place.
 LEAST_TRIED = 4
+# A rest that effects of so many other kinds take this share of tells of none of them.
+LEAST_OTHER_KINDS, LEAST_SHARE_OF_REST = 3, 0.5
 # Share of what a verdict leaves that makes a set worth following.
 LEAST_LEAD = 0.25
 
@@ -298,9 +300,35 @@ def needs_each(
         least = 0.0 if is_all and criteria.ratio(fits[left]) > STILL_LARGE else least
         is_clear = is_clear and brings >= least * criteria.excess(base)
         is_clear = is_clear and criteria.is_beyond_stand_in(whole, fits[left])
-        if not (is_clear and explains):
+        if not (is_clear and explains) or _is_anyones(criteria, whole, effect, fits):
             return False
     return True
+
+
+def _is_anyones(
+    criteria: SelectionCriteria,
+    whole: CandidateFit,
+    effect: str,
+    fits: Mapping[tuple[str, ...], CandidateFit],
+) -> bool:
+    """Whether others of several kinds take as much of a rest hardly above the noise.
+
+    A law that is not quite that of the machine leaves such a rest, and whatever bends the
+    motion a little takes of it.
+    """
+    part = fits[tuple(one for one in whole.effects if one != effect)]
+    if criteria.ratio(part) > SMALL_REMAINDER:
+        return False
+    left = set(part.effects)
+    least = LEAST_SHARE_OF_REST * (criteria.excess(part) - criteria.excess(whole))
+    others = {
+        public_id(other)
+        for one in fits.values()
+        if one.is_usable and left < set(one.effects)
+        if criteria.excess(part) - criteria.excess(one) >= least
+        for other in set(one.effects) - left
+    }
+    return len(others - {public_id(effect)}) >= LEAST_OTHER_KINDS
 
 
 def _is_small_beside_impacts(criteria: SelectionCriteria, part: CandidateFit) -> bool:

@@ -587,6 +587,26 @@ def test_without_evidence_for_the_set_its_part_is_named():
 
 
 @pytest.mark.parametrize(
+    ("others", "left", "chosen"),
+    [
+        # Three of other kinds take more than half of a rest of a tenth of the noise ...
+        (("input_delay", "cogging", "sensor_drift"), 104.0, NAMED),
+        # ... but two do not say that anything would, nor do two forms of one law ...
+        (("input_delay", "cogging"), 104.0, BOTH),
+        (("input_delay", "cogging", "cogging:about_mean"), 104.0, BOTH),
+        # ... nor three that take less than half.
+        (("input_delay", "cogging", "sensor_drift"), 106.5, BOTH),
+    ],
+)
+def test_a_small_rest_that_anything_takes_tells_of_no_effect(others, left, chosen):
+    pairs = [
+        made_up(sorted(("coulomb_friction", one)), left, parameters=2) for one in others
+    ]
+    verdict = decided(base(), [NAMED, BOTH, *pairs], [NAMED, BOTH])
+    assert verdict.chosen is chosen
+
+
+@pytest.mark.parametrize(
     ("left", "own", "chosen"),
     [
         # 0.3 % of what is missing: enough for a law that all recordings share ...

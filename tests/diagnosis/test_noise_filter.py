@@ -1,0 +1,141 @@
+"""What noise of the input hides on a free axis, and the filter that shows it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis.diagnose import diagnose
+from hwid_cli.diagnosis.noise_filter import FilteredTasks, with_noise_filter
+from hwid_cli.diagnosis.tasks import DiagnosisTask
+from hwid_cli.records.drive import Drive
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.recordings import Recording
+from tests.diagnosis.small_drive import DRIVE, in_turn, problem, white
+
+FREE = replace(DRIVE, stiffness_N_per_m=0.0)
+AXIS = Drive(95.0, 204.0, 0.0, 35.0, hold="zero")
+STEP_S, N = 2e-3, 2000
+
+
+def floor(input_rms):
+    return replace(white(), input_rms=input_rms)
+
+
+@pytest.mark.parametrize(
+    ("drive", "input_rms", "is_hidden"),
+    [
+        (FREE, 0.02, True),
+        # A spring holds it, a quiet input does not move it, a held command has no noise.
+        (DRIVE, 2e-4, False),
+        (FREE, 1e-6, False),
+        (FREE, 0.0, False),
+    ],
+)
+def test_only_noise_that_adds_up_hides_anything(drive, input_rms, is_hidden):
+    of = replace(problem(), drive=drive)
+    found = with_noise_filter(of, drive, floor(input_rms))
+    assert (found is not None) is is_hidden
+
+
+def test_behind_the_filter_noise_of_both_is_white_and_as_large_as_that_of_the_output():
+    of = replace(problem(), drive=FREE)
+    noise = floor(0.02)
+    found = with_noise_filter(of, FREE, noise)
+    assert found.is_filtered
+    assert with_noise_filter(found, FREE, noise) is None
+    one = found.signals[0]
+    rng = np.random.default_rng(3)
+    # By sums: the axis has forgotten nothing but its velocity.
+    n, step = 4000, one.sample_time_s
+    u = noise.input_rms * rng.standard_normal(n)
+    x = v = 0.0
+    left = np.zeros(n)
+    for k in range(n):
+        left[k] = x + noise.rms * rng.standard_normal()
+        following = u[min(k + 1, n - 1)]
+        for j in range(20):
+            force = FREE.force_constant_N_per_A * (
+                u[k] + (j + 0.5) / 20 * (following - u[k])
+            )
+            v += step / 20 * (force - FREE.damping_N_s_per_m * v) / FREE.mass_kg
+            x += step / 20 * v
+    white_left = one.filtered(left)
+    assert np.sqrt(np.mean(left**2)) > 10 * noise.rms
+    assert np.sqrt(np.mean(white_left**2)) == pytest.approx(noise.rms, rel=0.06)
+    lagged = white_left[1:] @ white_left[:-1] / (white_left @ white_left)
+    assert abs(lagged) < 4 / np.sqrt(n)
+
+
+def test_tasks_behind_the_filter_are_no_others():
+    asked = []
+
+    def run(tasks, *, keep):
+        asked.extend((one.content, len(one.arrays)) for one in tasks)
+        return [1] * len(tasks)
+
+    of = replace(problem(), drive=FREE)
+    behind = FilteredTasks(run, with_noise_filter(of, FREE, floor(0.02)))
+    task = DiagnosisTask("t", len, (), int, {"effects": ()})
+    assert behind([task], keep=True) == [1]
+    assert asked == [({"effects": (), "filter": "noise"}, 1)]
+
+
+def moved(wanted, seed):
+    """A stage over two rows of magnets, under a position controller, in 20 steps a sample.
+
+    The logger reads the current with noise and the scale in steps of 1 um.
+    """
+    rng = np.random.default_rng(seed)
+    x = v = total = 0.0
+    current, place = np.zeros(N), np.zeros(N)
+    for k in range(N):
+        error = 12.0 * (wanted[k] - x) - v
+        total = np.clip(total + 6.0 * STEP_S * error, -0.05, 0.05)
+        current[k], place[k] = 108.0 * (error + total), x
+        for _ in range(20):
+            magnets = 10.0 * np.sin(2 * np.pi * x / 0.032 + 0.7)
+            magnets += 3.5 * np.sin(2 * np.pi * x / 0.0135 - 0.4)
+            v += STEP_S / 20 * (35.0 * current[k] - 200.0 * v + magnets) / 95.0
+            x += STEP_S / 20 * v
+    noisy = current + 0.01 * rng.standard_normal(N)
+    steps = np.round((place + 3e-7 * rng.standard_normal(N)) * 1e6) / 1e6
+    return Recording(
+        f"move_{seed}", noisy, steps, STEP_S, input_unit="A", output_unit="m"
+    )
+
+
+@pytest.mark.thorough
+def test_two_rows_of_magnets_are_told_far_below_what_noise_of_the_current_adds_up_to():
+    t = STEP_S * np.arange(N)
+    smooth = 0.5 - 0.5 * np.cos(np.pi * np.clip((t - 0.2) / 1.2, 0, 1))
+    back = 0.5 - 0.5 * np.cos(np.pi * np.clip((t - 2.2) / 1.2, 0, 1))
+    wanted = [
+        0.12 * (smooth - back),
+        0.07 * smooth + 0.05 * back,
+        0.08 * np.sin(2 * np.pi * 0.5 * np.maximum(t - 0.2, 0)),
+        0.1 * smooth - 0.14 * back,
+    ]
+    found = diagnose(
+        [moved(one, seed) for seed, one in enumerate(wanted)],
+        SimulationOptions(
+            mass_kg=95.0,
+            damping_N_s_per_m=225.0,
+            stiffness_N_per_m=0.0,
+            force_constant_N_per_A=33.5,
+            hold="zero",
+        ),
+        DiagnoseOptions(effects=("cogging", "coulomb_friction", "input_delay")),
+        in_turn,
+        lambda *_: None,
+    )
+    assert [one.id for one in found.effects] == ["cogging", "cogging"]
+    values = [{p.name: p.value for p in one.parameters} for one in found.effects]
+    assert values[0]["amplitude_N"] == pytest.approx(10.0, rel=0.02)
+    assert values[0]["period_m"] == pytest.approx(0.032, rel=2e-3)
+    assert values[1]["amplitude_N"] == pytest.approx(3.5, rel=0.05)
+    assert values[1]["period_m"] == pytest.approx(0.0135, rel=2e-3)
+    assert found.after.ratio_to_noise < 2.0 < 20.0 < found.before.ratio_to_noise
+    assert (
+        "behind a filter that takes out what noise of the input" in found.noise.sentence
+    )
