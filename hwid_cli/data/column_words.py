@@ -198,7 +198,16 @@ _PLUGS = {"in", "input", "eingang", "out", "output", "ausgang", "amp"}
 _SOURCES_OR_SENSORS = {"laser", "led"}
 # What leaves one of these drives the machine: amp out.
 _AMPLIFIERS = {
-    *("amp", "amplifier", "verstärker", "verstaerker", "generator", "gen", "awg", "dac"),
+    *(
+        "amp",
+        "amplifier",
+        "verstärker",
+        "verstaerker",
+        "generator",
+        "gen",
+        "awg",
+        "dac",
+    ),
 }
 # Words and units of numbers that nobody has calibrated.
 _UNCALIBRATED = {"raw", "counts", "count", "cts", "adc", "lsb", "digits", "ticks"}

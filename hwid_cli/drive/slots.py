@@ -139,5 +139,6 @@ that is switched off is 0, except where the comment says infinite.
     BRISTLE_DAMPING,
     BRISTLE_EXCESS,
     SENSOR_LAG_DAMPING_RATIO,
+    IRON,  # how far iron is driven at the reference current
     N_SLOTS,
-) = range(132)
+) = range(133)

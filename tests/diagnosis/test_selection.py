@@ -587,6 +587,22 @@ def test_without_evidence_for_the_set_its_part_is_named():
 
 
 @pytest.mark.parametrize(
+    ("left", "is_foreign", "word"),
+    [(112.0, True, "ambiguous"), (112.0, False, "named"), (120.0, True, "named")],
+)
+def test_a_simulation_that_starts_at_rest_swings_up_where_the_machine_has_swung(
+    left, is_foreign, word
+):
+    standing = StandIn(1.0, 1.0, 1.0, 1.0) if is_foreign else None
+    criteria = replace(CRITERIA, standing=standing)
+    hum = made_up(("sensor_hum",), 100.0, whiteness=0.6)
+    force = made_up(("periodic_force",), left, whiteness=9.0)
+    verdict = decided(base(), [hum, force], [hum], criteria=criteria)
+    assert verdict.chosen is hum
+    assert verdict.word == word
+
+
+@pytest.mark.parametrize(
     ("others", "left", "chosen"),
     [
         # Three of other kinds take more than half of a rest of a tenth of the noise ...

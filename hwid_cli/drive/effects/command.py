@@ -5,6 +5,9 @@ docs/method_diagnosis.md, eq. (D4) to (D7).
 
 from math import inf, pi
 
+import numpy as np
+from scipy.optimize import brentq
+
 from hwid_cli.drive.effect import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -12,6 +15,8 @@ from hwid_cli.drive.effect import (
     Limit,
     Parameter,
     Scales,
+    Stated,
+    Values,
     ratio_of_lag,
     shares_of,
     span_of,
@@ -157,6 +162,46 @@ CONSTANT_SATURATION = Effect(
     confused_with={
         "supply_sag": "steps of many sizes and little noise",
         "sensor_cubic": "a sine near resonance",
+    },
+)
+
+
+def _iron(values: Values) -> float:
+    """How far iron is driven at the reference current: tanh(z) / z is what is left.
+
+    Returns
+    -------
+    float, [-]
+        At most 20, where a twentieth of the force constant is left.
+    """
+    left = 1.0 - min(max(values["loss_at_reference"], 0.0), 0.95)
+    if left > 1.0 - 1e-9:
+        return 0.0
+    return float(brentq(lambda z: np.tanh(z) / z - left, 1e-6, 20.0, xtol=1e-13))
+
+
+IRON_SATURATION = Effect(
+    id="force_constant_saturation:iron",
+    sentence="the force approaches a limit as the iron saturates",
+    equation="kt i -> kt Is tanh(i / Is), Is such that tanh(Iref / Is) = (1 - a) Iref / Is",
+    enters="force",
+    parameters=(
+        Parameter(
+            "loss_at_reference",
+            lambda scales: (0.08, 0.25, 0.6),
+            lambda scales: (1e-4, 0.9),
+            limits=(POSITIVE, _BELOW_WHOLE),
+        ),
+    ),
+    derived={"IRON": _iron},
+    stated=(
+        Stated("loss_at_reference", (POSITIVE, _BELOW_WHOLE)),
+        Stated("curve", words=("tanh",), is_needed=False),
+    ),
+    words={"curve": "tanh"},
+    confused_with={
+        "supply_sag": "steps of many sizes and little noise",
+        "input_saturation": "steps of several sizes below the limit",
     },
 )
 
@@ -331,6 +376,7 @@ EFFECTS = (
     LAG,
     SECOND_ORDER_LAG,
     CONSTANT_SATURATION,
+    IRON_SATURATION,
     SAG,
     RIPPLE,
     THERMAL,

@@ -62,6 +62,7 @@ def has_losses(p: np.ndarray) -> bool:
     """
     return (
         p[slots.SATURATION_LOSS] != 0.0
+        or p[slots.IRON] > 0.0
         or p[slots.SAG_LOSS] != 0.0
         or p[slots.THERMAL_LOSS] != 0.0
     )
@@ -93,6 +94,9 @@ def force_of(current: float, warmth: float, p: np.ndarray) -> float:
     share = abs(current) / p[slots.REFERENCE_CURRENT]
     loss = (p[slots.SATURATION_LOSS] * share + p[slots.SAG_LOSS]) * share
     loss += p[slots.THERMAL_LOSS] * warmth
+    turn = p[slots.IRON] * share
+    if turn > 0.0:
+        loss += 1.0 - np.tanh(turn) / turn
     return p[slots.FORCE_CONSTANT] * (1.0 - loss) * current
 
 

@@ -132,7 +132,8 @@ enum {
     BRISTLE_DAMPING = 128,
     BRISTLE_EXCESS = 129,
     SENSOR_LAG_DAMPING_RATIO = 130,
-    N_SLOTS = 131,
+    IRON = 131,
+    N_SLOTS = 132,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -636,7 +637,7 @@ static int drive_depends_on_motion(double *p)
 
 static int drive_has_losses(double *p)
 {
-    return (p[SATURATION_LOSS] != 0.0) || (p[SAG_LOSS] != 0.0) || (p[THERMAL_LOSS] != 0.0);
+    return (p[SATURATION_LOSS] != 0.0) || (p[IRON] > 0.0) || (p[SAG_LOSS] != 0.0) || (p[THERMAL_LOSS] != 0.0);
 }
 
 static int drive_is_straight(double *p)
@@ -651,9 +652,14 @@ static double drive_force_of(double current, double warmth, double *p)
 {
     double share = 0.0;
     double loss = 0.0;
+    double turn = 0.0;
     share = fabs(current) / p[REFERENCE_CURRENT];
     loss = ((p[SATURATION_LOSS] * share) + p[SAG_LOSS]) * share;
     loss += p[THERMAL_LOSS] * warmth;
+    turn = p[IRON] * share;
+    if (turn > 0.0) {
+        loss += 1.0 - (tanh(turn) / turn);
+    }
     return (p[FORCE_CONSTANT] * (1.0 - loss)) * current;
 }
 
