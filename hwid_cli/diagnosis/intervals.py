@@ -25,6 +25,8 @@ from hwid_cli.records.candidates import CandidateFit, ParameterRef
 
 # Normal quantile of a 95 % interval.
 QUANTILE = 1.96
+# What swings all the time, and how near frequencies are to multiples of one, [-].
+_SWINGS, _OF_ONE_FREQUENCY = ("periodic_force", "sensor_hum"), 0.005
 # Share of the best determined direction below which one counts as undetermined.
 _DETERMINED = 1e-12
 # A strength that is so near its bound would go farther, [-].
@@ -71,9 +73,30 @@ def unclear_effects(
         own = CATALOGUE[effect].told_by
         return tuple(one for one in refs if not is_shared or one.parameter == own)
 
+    of_one = harmonics(found)
     return tuple(
-        effect for effect in found.effects if not all(map(is_clear, telling(effect)))
+        effect
+        for effect in found.effects
+        if effect in of_one or not all(map(is_clear, telling(effect)))
     )
+
+
+def harmonics(found: CandidateFit) -> tuple[str, ...]:
+    """The faster one of a force and a hum that swing at multiples of one frequency.
+
+    A force that is no pure sine has harmonics, which such a hum would be as well.
+    """
+    frequencies = {
+        one.owner: value
+        for one, value in zip(found.names, found.values, strict=True)
+        if one.owner in _SWINGS and one.parameter == "frequency_Hz"
+    }
+    if len(frequencies) < len(_SWINGS):
+        return ()
+    slow, fast = sorted(frequencies, key=lambda one: frequencies[one])
+    ratio = frequencies[fast] / frequencies[slow]
+    is_multiple = ratio > 1.5 and abs(ratio / round(ratio) - 1.0) < _OF_ONE_FREQUENCY
+    return (fast,) if is_multiple else ()
 
 
 def _contained(

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.intervals import (
+    harmonics,
     intervals,
     runs_to_bound,
     shared_covariance,
     unclear_effects,
 )
 from hwid_cli.records.candidates import ParameterRef
+from tests.diagnosis.made_up_fits import made_up
 from tests.diagnosis.small_drive import fit, problem, recordings, sizes
 
 STRIBECK = {"force_N": 0.6, "static_excess_N": 0.5, "velocity_m_per_s": 0.02}
@@ -140,3 +142,23 @@ def test_what_the_simulation_has_of_a_law_may_be_all_of_its_strength():
     # Of its own strength nothing is said.
     low, high = intervals(given, found, scales)
     assert np.isnan([low[none], high[none]]).all()
+
+
+@pytest.mark.parametrize(
+    ("force_Hz", "hum_Hz", "unclear"),
+    [
+        (6.6, 13.2, ("sensor_hum",)),
+        (13.21, 6.6, ("periodic_force",)),
+        (16.5, 50.0, ()),
+        (10.0, 10.0, ()),
+    ],
+)
+def test_a_hum_at_a_multiple_of_a_force_may_be_its_harmonic(force_Hz, hum_Hz, unclear):
+    found = made_up(("periodic_force", "sensor_hum"), 100.0)
+    names = tuple(
+        ParameterRef(one, "frequency_Hz") for one in ("periodic_force", "sensor_hum")
+    )
+    pair = replace(found, names=names, values=np.array([force_Hz, hum_Hz]))
+    assert harmonics(pair) == unclear
+    alone = replace(found, names=names[:1], values=np.array([force_Hz]))
+    assert harmonics(alone) == ()
