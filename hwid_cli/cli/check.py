@@ -172,6 +172,7 @@ def _show_plan(
             workers,
             checked.logs,
             reading_seconds,
+            timing,
         )
         plans = with_start(
             [
@@ -188,7 +189,7 @@ def _show_plan(
 
 def _cost(experiment: Experiment, checked: Checked, *, timing: bool) -> FitCost:
 
-    if not timing:
+    if not timing or "identify" not in to_run(experiment):
         return MEASURED
     if not any(
         Path(compiled_loops_place()).glob("derivative_rows.derivative_rows*.nbi")

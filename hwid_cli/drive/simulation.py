@@ -7,6 +7,7 @@ docs/method_diagnosis.md, eq. (D1) to (D14).
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import scipy
@@ -113,6 +114,13 @@ def simulate_drive(
     if drive.hold == "smooth":
         return run(refined(given), vector, sample_time_s, refinement=REFINEMENT)
     return run(given, vector, sample_time_s)
+
+
+def are_loops_compiled() -> bool:
+    """Whether the compiled loops of a motion are kept from an earlier run."""
+    # numba's own count of what it found there.
+    place = str(move.stats.cache_path)  # type: ignore[attr-defined]
+    return any(Path(place).glob("move.move*.nbi"))
 
 
 def refined(driven_by: np.ndarray) -> np.ndarray:

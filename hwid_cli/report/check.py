@@ -65,7 +65,11 @@ def stages_table(plans: Sequence[StagePlan], cost: FitCost, workers: int) -> Tab
             for plan in plans
             if "to" in time_range(plan.seconds, plan.longest_seconds)
         ),
-        f"Scaled from {cost.source}: {cost.seconds:.3f} s for {cost.n_samples} samples.",
+        *(
+            f"Scaled from {cost.source}: {cost.seconds:.3f} s for {cost.n_samples} samples."
+            for plan in plans
+            if plan.stage == "identify"
+        ),
         f"Disk: about {size(sum(plan.size_bytes for plan in plans))} more.",
     )
     columns = (

@@ -19,6 +19,7 @@ from hwid_cli.diagnosis.direction import ReversedInputError, reversal_sentence
 from hwid_cli.diagnosis.foreign import MOST_SEARCHES, diagnose_foreign
 from hwid_cli.diagnosis.hidden import HiddenEffect
 from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
+from hwid_cli.drive.simulation import are_loops_compiled
 from hwid_cli.errors import CacheError, ConfigError
 from hwid_cli.files.figure_files import read_figure, write_figure
 from hwid_cli.records.check import StagePlan
@@ -588,7 +589,8 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     given = given_by(planning.experiment, planning.recordings, planning.logs)
     n = len(given.recordings)
     what = f"{counted(n, 'recording')}, as many effects as diagnose.effects allows"
-    if not planning.cost.rounds:
+    # A first run compiles its loops, which would be all that is timed.
+    if not (planning.may_time and are_loops_compiled()):
         return (StagePlan(NAME, what, n, None, nan, 1e6),)
     found = time_diagnosis(
         lambda run, on_round: _diagnosed(given, run, on_round),

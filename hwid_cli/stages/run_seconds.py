@@ -10,6 +10,7 @@ from hwid_cli.records.check import StagePlan
 from hwid_cli.stages.fit_seconds import grid_seconds
 from hwid_cli.stages.joint_seconds import joint_plan
 from hwid_cli.stages.stage import Planning
+from hwid_cli.stages.table import to_run
 
 # Reading the compiled loops of what the first tasks need, and starting processes that do
 # so too, once for all stages, [s].
@@ -25,7 +26,8 @@ def page_plan(planning: Planning) -> StagePlan:
     """What it takes to fit linear models, to write the page and to draw its figures."""
     seconds = _PAGE_SECONDS + _FIGURES_SECONDS * len(planning.recordings)
     what = "the page and its figures"
-    if planning.experiment.fit.has_maps:
+    fits = "identify" in to_run(planning.experiment)
+    if fits and planning.experiment.fit.has_maps:
         what = "linear models, the page and its figures"
         seconds += _linear_seconds(planning)
     return StagePlan("report", what, 1, None, seconds, 0.0)

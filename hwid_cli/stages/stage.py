@@ -110,6 +110,8 @@ class Planning:
         In the order of the recordings.
     reading_seconds : float, [s]
         What it took to read and calibrate them.
+    may_time : bool
+        Whether a stage may run some of its work to time it.
     """
 
     experiment: Experiment
@@ -119,6 +121,7 @@ class Planning:
     workers: int = 1
     logs: tuple[CalibrationLog, ...] = ()
     reading_seconds: float = 0.0
+    may_time: bool = False
 
 
 def _nothing(*_: Any) -> tuple[Any, ...]:

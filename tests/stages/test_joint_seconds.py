@@ -6,11 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hwid_cli.cli import check
 from hwid_cli.config.load import load_experiment
 from hwid_cli.records.check import FitCost
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 from hwid_cli.stages import fit_seconds, joint_seconds
+from hwid_cli.stages.recording_facts import Checked
 from hwid_cli.stages.run_seconds import page_plan
 from hwid_cli.stages.stage import Planning
 from hwid_cli.stages.table import stage_named
@@ -137,3 +139,20 @@ def test_each_recording_has_a_say_in_how_long_maps_take(monkeypatch):
     found = fit_seconds.map_seconds(COST, orders, recordings_of((1000,) * 8), maps)
     assert found == pytest.approx(8 * 4.0)
     assert fitted == [(f"run_{row}", 2 + row) for row in range(8)]
+
+
+def test_nothing_is_timed_and_no_linear_model_planned_where_nothing_is_fitted(
+    tmp_path, monkeypatch
+):
+    config = tmp_path / "experiment.yaml"
+    config.write_text(
+        "name: x\nrecordings: {files: data/*.csv, columns: {input: u, output: y}, "
+        "sample_time_s: 0.001}\nsimulation: {mass_kg: 1.0, damping_N_s_per_m: 2.0, "
+        "stiffness_N_per_m: 0.0, force_constant_N_per_A: 3.0}\ndiagnose: {}\n"
+    )
+    monkeypatch.setattr(check, "time_fits", None)
+    experiment, recordings = load_experiment(config), tuple(recordings_of((500,) * 3))
+    cost = check._cost(experiment, Checked((), recordings, ()), timing=True)
+    assert cost is fit_seconds.MEASURED
+    given = Planning(experiment, recordings, cost, MemoryStore())
+    assert page_plan(given).what == "the page and its figures"
