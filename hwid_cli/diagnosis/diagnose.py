@@ -71,6 +71,7 @@ from hwid_cli.diagnosis.rounds import RoundsResult, continue_rounds, run_rounds
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED_SET,
     LEAST_GAIN,
+    MOST_LEFT_BY_SET,
     SelectionCriteria,
     title_of,
 )
@@ -293,11 +294,11 @@ def find(
         If the output clearly moves against the input.
     """
     searched = _held_or_not(problem, options, run_tasks, on_round, given_sse)
+    if may_cut:
+        searched = _with_pieces(searched, options.max_effects)
     behind = _behind_noise_filter(searched, options)
     if behind is not None:
         return behind
-    if may_cut:
-        searched = _with_pieces(searched, options.max_effects)
     whole = _judged(searched, options)
     if whole.pieces is not None or whole.law is not None:
         return whole
@@ -345,7 +346,7 @@ def _behind_noise_filter(
     again = _searched(problem, options, run_tasks, rounds.on_round, None)
     told = _judged(again, replace(options, laws="never"))
     left = told.criteria.ratio(told.verdict.chosen)
-    if told.verdict.word == "unknown" or left > STILL_LARGE:
+    if told.verdict.word == "unknown" or left > MOST_LEFT_BY_SET:
         return None
     sentence = filtered_sentence(
         told.criteria.noise, noise.input_rms, rounds.problem.input_unit
