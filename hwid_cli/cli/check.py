@@ -26,6 +26,7 @@ from hwid_cli.records.recordings import Calibrated
 from hwid_cli.report.check import check_document, recordings_table, stages_table
 from hwid_cli.report.table import as_text
 from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_fits
+from hwid_cli.stages.identify import recordings_with_models, stored_fits
 from hwid_cli.stages.joint_seconds import time_joint_fits
 from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.recording_facts import Checked, check_recordings
@@ -35,6 +36,7 @@ from hwid_cli.stages.simulation_units import refused_units
 from hwid_cli.stages.stage import Context, Planning
 from hwid_cli.stages.table import named, needed, stage_named, to_run
 from hwid_cli.store.cache import Hdf5Store
+from hwid_cli.tasks.cache import Store
 from hwid_cli.tasks.task import one_thread
 from hwid_cli.tasks.workers import Workers
 
@@ -161,8 +163,8 @@ def _show_plan(
 
     cache, jobs, timing, reading_seconds = how
     with one_thread():
-        cost = _cost(experiment, checked, timing=timing)
         store = Hdf5Store(cache, sets_aside=False)
+        cost = _cost(experiment, checked, store, timing=timing)
         workers = Workers(jobs).count
         planning = Planning(
             experiment,
@@ -187,7 +189,9 @@ def _show_plan(
     return plans, workers
 
 
-def _cost(experiment: Experiment, checked: Checked, *, timing: bool) -> FitCost:
+def _cost(
+    experiment: Experiment, checked: Checked, store: Store, *, timing: bool
+) -> FitCost:
 
     if not timing or "identify" not in to_run(experiment):
         return MEASURED
@@ -197,6 +201,11 @@ def _cost(experiment: Experiment, checked: Checked, *, timing: bool) -> FitCost:
         click.echo("\nThe first run compiles its loops: about 20 s more, once.")
         return MEASURED
     found = time_fits(checked.recordings, experiment.orders, experiment.fit)
+    chosen = recordings_with_models(checked.recordings, experiment)
+    fits, n_stored = stored_fits(experiment, chosen, store)
+    if n_stored == len(fits):
+        # What follows is there too, most likely.
+        return found
     return replace(found, joint=time_joint_fits(experiment, checked.recordings))
 
 

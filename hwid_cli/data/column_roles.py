@@ -313,8 +313,13 @@ def _chosen_output(first: _Named, outputs: list[_Named]) -> tuple[_Named, str]:
     meant = [one for one in outputs if one.meaning.rank <= OF_UNIT] or outputs
     together = [one for one in meant if one.meaning.rest == first.meaning.rest]
     chosen = together or meant
-    known = [one for one in chosen if not _is_uncalibrated(one)]
-    if known and known[0] is not chosen[0]:
+    # Of the same quantity: counts of a position beside a speed in rpm are meant.
+    known = [
+        one
+        for one in chosen
+        if one.meaning.rank == chosen[0].meaning.rank and not _is_uncalibrated(one)
+    ]
+    if known and known[0] is not chosen[0] and not signs.runs_away(known[0].values):
         title = chosen[0].column.title
         return known[0], f"{_by(known[0])}; {title!r} is not calibrated"
     settled = [one for one in chosen if not signs.runs_away(one.values)]
@@ -334,7 +339,7 @@ def _that_answers(
     if not signs.are_unrelated(first.values, last.values):
         return last, why
     for other in others:
-        if _answer(first, other) > _CLEAR:
+        if other.meaning.rank <= OF_UNIT and _answer(first, other) > _CLEAR:
             said = f"{_called(last.column)} has nothing to do with the input"
             return other, f"{_by(other)}; {said}"
     return last, why

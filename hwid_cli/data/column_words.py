@@ -209,6 +209,11 @@ _AMPLIFIERS = {
         "dac",
     ),
 }
+# Words of a sensor whose signal an amplifier makes larger.
+_SENSORS = {
+    *("charge", "sensor", "strain", "load", "cell", "lock", "bridge", "photo", "mic"),
+    *("gauge", "piezo", "probe", "ladung", "brücke", "microphone", "diode", "lvdt"),
+}
 # Words and units of numbers that nobody has calibrated.
 _UNCALIBRATED = {"raw", "counts", "count", "cts", "adc", "lsb", "digits", "ticks"}
 _CURRENT_UNITS = {"a", "ma", "ka"}
@@ -325,7 +330,7 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
         role, rank = "output", OF_UNIT + len(_HARDLY_MEANT)
     elif unit and (not role or _is_contradicted(role, used, unit)):
         role, rank, used = _role_of_unit(unit), OF_UNIT, ""
-    elif used in _PLUGS and _AMPLIFIERS & set(words):
+    elif used in _PLUGS and _AMPLIFIERS & set(words) and not _SENSORS & set(words):
         role, rank, used = "input", _INPUT.index("amp"), "amp"
     is_wanted = any(word in _WANTED and word != used for word in words)
     if is_reference or is_wanted:

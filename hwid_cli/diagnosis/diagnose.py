@@ -51,6 +51,7 @@ from hwid_cli.diagnosis.next_experiment import (
 from hwid_cli.diagnosis.noise_filter import (
     FilteredTasks,
     filtered_sentence,
+    plain_errors_sentence,
     with_noise_filter,
 )
 from hwid_cli.diagnosis.odd_recordings import with_odd_ones_trained
@@ -83,7 +84,7 @@ from hwid_cli.diagnosis.whiteness import whiteness
 from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import STILL_LARGE, Diagnosis
+from hwid_cli.records.diagnosis import STILL_LARGE, Diagnosis, NoiseFloor
 from hwid_cli.records.drive import LINE
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.own_effects import own_ids
@@ -332,7 +333,7 @@ def _behind_noise_filter(
     None where it is not needed, or settles nothing either.
     """
     rounds, criteria = searched.rounds, searched.rounds.criteria
-    if not searched.has_gap or criteria.standing is not None:
+    if not searched.has_gap or criteria.standing is not None or options.laws == "only":
         return None
     verdict = decided(rounds, searched.given_sse, searched.found)
     if verdict.is_complete or criteria.ratio(verdict.chosen) <= STILL_LARGE:
@@ -343,16 +344,35 @@ def _behind_noise_filter(
         return None
     rounds.on_round("behind a filter for noise of the input", 0)
     run_tasks = FilteredTasks(rounds.run_tasks, problem)
-    again = _searched(problem, options, run_tasks, rounds.on_round, None)
+    again = _held_or_not(problem, options, run_tasks, rounds.on_round, None)
     told = _judged(again, replace(options, laws="never"))
     left = told.criteria.ratio(told.verdict.chosen)
     if told.verdict.word == "unknown" or left > MOST_LEFT_BY_SET:
         return None
-    sentence = filtered_sentence(
-        told.criteria.noise, noise.input_rms, rounds.problem.input_unit
+    if told.pieces is None:
+        told = replace(told, other=other_command(again.rounds, told.verdict.chosen))
+    return _with_both_errors(told, noise)
+
+
+def _with_both_errors(told: Findings, noise: NoiseFloor) -> Findings:
+    """Findings behind a filter that say so, and what whole recordings differ by."""
+    problem, chosen = told.problem, told.verdict.chosen
+    after = compared_with_fit(problem, chosen, told.scales)
+    before_rms, after_rms = (
+        float(np.sqrt(np.mean(np.concatenate([one.residual for one in these]) ** 2)))
+        for these in (told.before, after)
     )
-    floor = replace(told.criteria.noise, sentence=sentence)
-    return replace(told, criteria=replace(told.criteria, noise=floor))
+    said = plain_errors_sentence(before_rms, after_rms, problem.unit)
+    floor = replace(
+        told.criteria.noise,
+        resolution=noise.resolution,
+        sentence=filtered_sentence(noise, problem.input_unit),
+    )
+    return replace(
+        told,
+        criteria=replace(told.criteria, noise=floor),
+        warnings=(*told.warnings, said),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -469,9 +489,7 @@ def _beside(
     before = compared_with_fit(problem, base, fitted.scales)
     force = latent_force(before, drive, noise)
     if given_sse is None:
-        given_sse = each_sum_of_squares(
-            [one.signals.filtered(one.residual) for one in fitted.given]
-        )
+        given_sse = each_sum_of_squares([one.left for one in fitted.given])
     rounds = Rounds(
         problem,
         Baseline(drive, fitted.scales, noise, problem.drive),
@@ -574,6 +592,7 @@ def _with_residual_noise(whole: Findings) -> Findings:
     )
     # Where a drive stands for another simulation, its own error may have any colour.
     is_open = whole.verdict.word == "unknown" and criteria.standing is None
+    is_open = is_open and not whole.problem.is_filtered
     if explains or not is_open or not base.is_usable:
         return whole
     noise = residual_noise(whole.before, criteria.noise, whole.problem.unit)

@@ -330,9 +330,10 @@ def played(
     step = min(one.sample_time_s for one in problem.signals)
     is_velocity = problem.drive.output == "velocity"
     nothing = np.zeros(command.size)
+    like = min(problem.signals, key=lambda one: one.sample_time_s)
     signals = Signals(
         "next", "other", command, nothing, command, nothing, step,
-        is_velocity=is_velocity,
+        is_velocity=is_velocity, noise_filter=like.noise_filter,
     )  # fmt: skip
     one = replace(problem, signals=(signals,))
     point = _single(candidate.point)

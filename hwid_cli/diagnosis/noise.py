@@ -96,8 +96,10 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
     unit = problem.unit
     resolution = float(grid) if is_limited else 0.0
     sentence = noise_sentence(found, method, resolution, unit)
+    # Behind a filter no step of the sensor is left.
+    shown = 0.0 if problem.is_filtered else resolution
     return NoiseFloor(
-        float(found.rms), method, resolution, found.is_coloured, found.whitening,
+        float(found.rms), method, shown, found.is_coloured, found.whitening,
         sentence, 0.0 if problem.is_filtered else _input_rms(problem),
     )  # fmt: skip
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.diagnosis.innovations import StationaryFilter
+from hwid_cli.diagnosis.noise import noise_levels
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.tasks import DiagnosisTask, RunTasks
 from hwid_cli.diagnosis.whitening_filters import noisy_drives
@@ -34,7 +35,10 @@ def with_noise_filter(
     drive : Drive
         With the re-fitted base.
     """
-    if problem.is_filtered or problem.compares_command or noise.input_rms <= 0:
+    if problem.is_filtered or problem.compares_command:
+        return None
+    has_one_size = not noise.is_coloured and np.ptp(noise_levels(problem, noise)) == 0
+    if noise.input_rms <= 0 or noise.rms <= 0 or not has_one_size:
         return None
     drives = noisy_drives([drive] * len(problem.signals), problem.signals)
     pairs = list(zip(drives, problem.signals, strict=True))
@@ -51,11 +55,26 @@ def with_noise_filter(
     return replace(problem, signals=signals) if is_whole else None
 
 
-def filtered_sentence(noise: NoiseFloor, input_rms: float, input_unit: str) -> str:
+def filtered_sentence(noise: NoiseFloor, input_unit: str) -> str:
     """What counts as noise behind the filter."""
     return (
-        f"{noise.sentence}; behind a filter that takes out what noise of the input, "
-        f"{input_rms:.2g} {input_unit}, has added up to"
+        f"{noise.sentence}; noise of the input, {noise.input_rms:.2g} {input_unit}, adds "
+        "up along a free axis, and a filter takes that out of all errors"
+    )
+
+
+def plain_errors_sentence(before: float, after: float, unit: str) -> str:
+    """What whole recordings differ by, of which the filter takes most out.
+
+    Parameters
+    ----------
+    before, after : float, [output unit]
+        With the re-fitted base, and with what is named.
+    """
+    return (
+        "errors are those behind a filter for noise of the input; whole recordings differ "
+        f"from the simulation by {before:.3g} {unit} with the re-fitted base and by "
+        f"{after:.3g} {unit} at last"
     )
 
 
@@ -69,7 +88,9 @@ class FilteredTasks:
     def __call__(self, tasks: Sequence[DiagnosisTask], *, keep: bool) -> list[Any]:
         """Results in the order of the tasks."""
         filters = [one.noise_filter for one in self.problem.signals]
-        arrays = [one.bottom for one in filters if one is not None]
+        arrays = [
+            np.r_[one.change.ravel(), one.gain] for one in filters if one is not None
+        ]
         marked = [
             replace(
                 one,

@@ -504,10 +504,7 @@ def residuals_at(
     """
     if not _is_possible(fit_layout, point):
         return [np.full(one.n_evaluated, np.nan) for one in problem.signals]
-    return [
-        one.signals.filtered(one.residual)
-        for one in compare_at(problem, fit_layout, point)
-    ]
+    return [one.left for one in compare_at(problem, fit_layout, point)]
 
 
 def _is_possible(fit_layout: ParameterLayout, point: ParameterPoint) -> bool:

@@ -152,7 +152,7 @@ def judged_in_pieces(
     if not of_pieces.base.is_usable:
         return None
     found = continue_rounds(of_pieces, RoundsResult(), seeds)
-    given = each_sum_of_squares([one.residual for one in compared_as_given(pieces)])
+    given = each_sum_of_squares([one.left for one in compared_as_given(pieces)])
     verdict = decided(of_pieces, given, found)
     is_near = of_pieces.criteria.ratio(verdict.chosen) <= STILL_LARGE
     if verdict.word != "named" or not is_near:

@@ -18,6 +18,9 @@ from hwid_cli.records.drive import LINE, SOURCES, UNSAID_HOLD, WINDING, Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
 
+# Samples that are not used are bridged for a filter up to so many from one that is: damage
+# takes one or two, longer ones are sound and only not evaluated, [samples].
+_BRIDGED = 2
 # Share of the range of a signal below which a change is rest.
 _REST = 1e-3
 # Every third recording of a kind validates; amplitudes and speeds take turns.
@@ -125,16 +128,30 @@ class Signals:
         """What a sensor without effects shows of a motion, [output unit]."""
         return motion.velocity if self.is_velocity else motion.position
 
-    def filtered(self, residual: np.ndarray) -> np.ndarray:
-        """What a simulation leaves, behind the filter where there is one.
+    def left(self, simulated: np.ndarray) -> np.ndarray:
+        """What a simulation leaves where it is evaluated, behind the filter if there is one.
+
+        The filter sees all samples: what a gap hides of the noise's past would come back
+        at its end. Single samples that are not used are bridged.
 
         Parameters
         ----------
-        residual : ndarray, shape (n_evaluated,), [output unit]
+        simulated : ndarray, shape (n_samples,), [output unit]
+            Of what is compared.
+
+        Returns
+        -------
+        ndarray, shape (n_evaluated,), [output unit]
         """
+        residual = self.compared - simulated
         if self.noise_filter is None:
-            return residual
-        return self.noise_filter(residual).values
+            return np.asarray(residual[self.evaluated])
+        if self.used is not None:
+            beside = np.convolve(self.used, np.ones(2 * _BRIDGED + 1), mode="same")
+            known = self.used | (beside == 0)
+            every = np.arange(residual.size)
+            residual = np.interp(every, every[known], residual[known])
+        return np.asarray(self.noise_filter(residual).values[self.evaluated])
 
     @cached_property
     def finely_driven_by(self) -> np.ndarray:
@@ -349,6 +366,11 @@ class Compared:
     def residual(self) -> np.ndarray:
         """Measured minus simulated, where it is evaluated."""
         return (self.signals.compared - self.simulated)[self.signals.evaluated]
+
+    @property
+    def left(self) -> np.ndarray:
+        """The same behind the filter for noise of the input, where there is one."""
+        return self.signals.left(self.simulated)
 
     @property
     def rms(self) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 
 from hwid_cli.compiled import INNER, compiled
-from hwid_cli.diagnosis.innovations import Innovations, StationaryFilter
+from hwid_cli.diagnosis.innovations import Innovations, StationaryFilter, answer
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.drive.linear import has_inner_states, linear_equations
 from hwid_cli.drive.springs import stiffness_at
@@ -96,16 +96,16 @@ class StraightDrive:
         both = strength * through * self.b[:, None]
         variance = float((c @ covariance @ c.T)[0, 0]) + 1.0 + strength * through**2
         correct = ((a @ covariance @ c.T + both) / variance).ravel()
-        return StationaryFilter(np.poly(a), np.poly(a - np.outer(correct, c)), variance)
+        change = np.ascontiguousarray(a - np.outer(correct, c))
+        return StationaryFilter(change, correct, np.ascontiguousarray(c[0]), variance)
 
     def moved(self, size: int) -> tuple[float, float]:
         """Mean square of the reading that noise of variance 1 makes from rest."""
-        top, bottom = scipy.signal.ss2tf(
-            self.a, self.b[:, None], self.c, np.array([[self.through]])
-        )
         pulse = np.zeros(size)
         pulse[0] = 1.0
-        impulse = scipy.signal.lfilter(top[0], bottom, pulse)
+        change, reading = map(np.ascontiguousarray, (self.a, self.c[0]))
+        gain = np.ascontiguousarray(self.b)
+        impulse = answer(change, gain, reading, self.through, pulse)
         mean_square = float(np.square(impulse) @ (1.0 - np.arange(size) / size))
         both_ways = scipy.signal.fftconvolve(impulse, impulse[::-1])[size - 1 :]
         together = np.square(both_ways / both_ways[0]) @ (1.0 - np.arange(size) / size)

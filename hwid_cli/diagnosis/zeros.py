@@ -43,7 +43,7 @@ def with_zeros(
     """
     has_offset = any(one.offset is not None for one in problem.signals)
     may_help = base.is_usable and 1.0 < base.whiteness < np.inf
-    if not may_help or has_offset or problem.compares_command:
+    if not may_help or has_offset or problem.compares_command or problem.is_filtered:
         return problem, base
     shifted, found, offsets = problem, base, np.zeros(len(problem.signals))
     for _ in range(_MOST_TURNS):

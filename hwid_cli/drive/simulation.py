@@ -118,9 +118,9 @@ def simulate_drive(
 
 def are_loops_compiled() -> bool:
     """Whether the compiled loops of a motion are kept from an earlier run."""
-    # numba's own count of what it found there.
-    place = str(move.stats.cache_path)  # type: ignore[attr-defined]
-    return any(Path(place).glob("move.move*.nbi"))
+    # numba's own count of what it found there; none where it compiles nothing.
+    found = getattr(move, "stats", None)
+    return found is None or any(Path(found.cache_path).glob("move.move*.nbi"))
 
 
 def refined(driven_by: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from hwid_cli.stages.fit_seconds import (
     livelier_part,
     middle_orders,
 )
-from hwid_cli.stages.linear_reference import linear_options
+from hwid_cli.stages.linear_reference import MOST_JOINED_LINEAR, linear_options
 from hwid_cli.stages.order_grid import candidate_orders
 from hwid_cli.stages.together import (
     FEW_UNITS,
@@ -164,7 +164,7 @@ def joint_plan(
         n_fits,
         (least, most),
         (n_left_out * extremes[0], n_left_out * extremes[1]),
-        linear * n_grid,
+        linear * n_grid * min(1.0, MOST_JOINED_LINEAR / len(own)),
     )
 
 

@@ -23,7 +23,7 @@ from hwid_cli.tasks.cache import recording_key, task_key
 from hwid_cli.tasks.task import Task
 
 # Recordings of a joint fit at most: more change few coefficients hardly.
-_MOST_JOINED = 8
+MOST_JOINED_LINEAR = 8
 # Share of its range at which an output has to begin for a level, and over how many samples.
 _LEAST_LEVEL, _FIRST_SAMPLES = 0.5, 5
 # Of models that are as good within this share, the one of the fewest coefficients, [-].
@@ -229,7 +229,7 @@ def _smallest_good(linear: Sequence[Fit], choosing: Sequence[Recording]) -> Fit 
 
 def _evenly(recordings: Sequence[Recording]) -> list[Recording]:
     """So many of them as are joined, evenly chosen."""
-    count = min(len(recordings), _MOST_JOINED)
+    count = min(len(recordings), MOST_JOINED_LINEAR)
     at = np.linspace(0, len(recordings) - 1, count)
     return [recordings[round(place)] for place in at]
 

@@ -459,3 +459,16 @@ def test_an_output_that_has_nothing_to_do_with_the_input_gives_way():
         ("Strom", VOLTAGE, "A"), ("Drehzahl", steady, "1/min"), ("Moment", other, "Nm")
     )
     assert (first, last) == ("Strom", "Drehzahl")
+
+
+def test_counts_of_a_position_and_a_sensors_amplifier_are_outputs_still():
+    first, last, _ = guessed(
+        ("current", VOLTAGE, "A"),
+        ("position", POSITION, "counts"),
+        ("speed", SPEED, "rpm"),
+    )
+    assert (first, last) == ("current", "position")
+    first, last, _ = guessed(
+        ("drive voltage", VOLTAGE, "V"), ("Charge Amp Out", POSITION, "V")
+    )
+    assert (first, last) == ("drive voltage", "Charge Amp Out")

@@ -7,7 +7,9 @@ import pytest
 
 from hwid_cli.diagnosis.diagnose import diagnose
 from hwid_cli.diagnosis.noise_filter import FilteredTasks, with_noise_filter
+from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.tasks import DiagnosisTask
+from hwid_cli.diagnosis.whitening_filters import straight_drive
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
@@ -60,11 +62,68 @@ def test_behind_the_filter_noise_of_both_is_white_and_as_large_as_that_of_the_ou
             )
             v += step / 20 * (force - FREE.damping_N_s_per_m * v) / FREE.mass_kg
             x += step / 20 * v
-    white_left = one.filtered(left)
+    white_left = one.noise_filter(left).values
     assert np.sqrt(np.mean(left**2)) > 10 * noise.rms
     assert np.sqrt(np.mean(white_left**2)) == pytest.approx(noise.rms, rel=0.06)
     lagged = white_left[1:] @ white_left[:-1] / (white_left @ white_left)
     assert abs(lagged) < 4 / np.sqrt(n)
+
+
+@pytest.fixture(scope="module")
+def drifted():
+    """Signals of a free axis whose simulation is off by what noise has added up to."""
+    rng = np.random.default_rng(4)
+    n, step = 6000, 1e-3
+    v = 1e-4 * np.convolve(rng.standard_normal(n), 0.998 ** np.arange(n))[:n]
+    left = np.cumsum(v) * step + 1e-6 * rng.standard_normal(n)
+    drive = replace(FREE, damping_N_s_per_m=FREE.mass_kg * 2.0, hold="zero")
+    push = 1e-4 * FREE.mass_kg / step / FREE.force_constant_N_per_A
+    one = straight_drive(drive, step)
+    nothing = np.zeros(n)
+    signals = Signals("r", "", nothing, left, nothing, left, step)
+    found = one.whitening((push / 1e-6) ** 2)
+    return replace(signals, noise_filter=found)
+
+
+BLOCKS = np.arange(6000) // 600 % 2 == 0
+DAMAGED = np.arange(6000) % 97 != 5
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        {},
+        {"skip": 3000},
+        {"used": BLOCKS},
+        {"used": DAMAGED},
+    ],
+)
+def test_what_is_not_evaluated_is_still_seen_by_the_filter(drifted, part):
+    signals = replace(drifted, **part)
+    if part.get("used") is DAMAGED:
+        compared = signals.compared.copy()
+        compared[~DAMAGED] += 1.0
+        signals = replace(signals, compared=compared)
+    left = signals.left(np.zeros(6000))
+    assert left.size == signals.n_evaluated
+    assert np.sqrt(np.mean(left**2)) == pytest.approx(1e-6, rel=0.1)
+    assert np.abs(left).max() < 6e-6
+
+
+def test_many_states_near_one_another_keep_their_digits():
+    effects = {
+        "second_mode": {"mass_kg": 0.1, "frequency_Hz": 30.0, "damping_ratio": 0.02},
+        "actuator_lag": {"time_constant_s": 0.002, "damping_ratio": 0.7},
+    }
+    one = straight_drive(replace(FREE, effects=effects), 2e-5)
+    found = one.whitening(1e8)
+    residual = np.random.default_rng(6).standard_normal(20_000)
+    state, expected = np.zeros(one.b.size), np.zeros(residual.size)
+    for n, value in enumerate(residual):
+        expected[n] = value - found.reading @ state
+        state = found.change @ state + found.gain * value
+    assert found(residual).values * np.sqrt(found.variance) == pytest.approx(expected)
+    assert np.abs(np.linalg.eigvals(found.change)).max() < 1.0
 
 
 def test_tasks_behind_the_filter_are_no_others():
@@ -136,6 +195,7 @@ def test_two_rows_of_magnets_are_told_far_below_what_noise_of_the_current_adds_u
     assert values[1]["amplitude_N"] == pytest.approx(3.5, rel=0.05)
     assert values[1]["period_m"] == pytest.approx(0.0135, rel=2e-3)
     assert found.after.ratio_to_noise < 2.0 < 20.0 < found.before.ratio_to_noise
-    assert (
-        "behind a filter that takes out what noise of the input" in found.noise.sentence
-    )
+    assert "a filter takes that out of all errors" in found.noise.sentence
+    (said,) = (one for one in found.warnings if "behind a filter" in one)
+    # Whole recordings differ by what the noise has added up to.
+    assert "at last" in said

@@ -152,7 +152,8 @@ def test_nothing_is_timed_and_no_linear_model_planned_where_nothing_is_fitted(
     )
     monkeypatch.setattr(check, "time_fits", None)
     experiment, recordings = load_experiment(config), tuple(recordings_of((500,) * 3))
-    cost = check._cost(experiment, Checked((), recordings, ()), timing=True)
+    given = Checked((), recordings, ())
+    cost = check._cost(experiment, given, MemoryStore(), timing=True)
     assert cost is fit_seconds.MEASURED
     given = Planning(experiment, recordings, cost, MemoryStore())
     assert page_plan(given).what == "the page and its figures"

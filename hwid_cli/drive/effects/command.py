@@ -166,15 +166,19 @@ CONSTANT_SATURATION = Effect(
 )
 
 
+# Beyond it the current is so far above what saturates the iron that only a limit is seen.
+_BELOW_ALL_IRON = Limit("a share of at most 0.9", lambda value: value <= 0.9)
+
+
 def _iron(values: Values) -> float:
     """How far iron is driven at the reference current: tanh(z) / z is what is left.
 
     Returns
     -------
     float, [-]
-        At most 20, where a twentieth of the force constant is left.
+        0 where nothing is lost.
     """
-    left = 1.0 - min(max(values["loss_at_reference"], 0.0), 0.95)
+    left = 1.0 - values["loss_at_reference"]
     if left > 1.0 - 1e-9:
         return 0.0
     return float(brentq(lambda z: np.tanh(z) / z - left, 1e-6, 20.0, xtol=1e-13))
@@ -190,12 +194,12 @@ IRON_SATURATION = Effect(
             "loss_at_reference",
             lambda scales: (0.08, 0.25, 0.6),
             lambda scales: (1e-4, 0.9),
-            limits=(POSITIVE, _BELOW_WHOLE),
+            limits=(POSITIVE, _BELOW_ALL_IRON),
         ),
     ),
     derived={"IRON": _iron},
     stated=(
-        Stated("loss_at_reference", (POSITIVE, _BELOW_WHOLE)),
+        Stated("loss_at_reference", (POSITIVE, _BELOW_ALL_IRON)),
         Stated("curve", words=("tanh",), is_needed=False),
     ),
     words={"curve": "tanh"},
