@@ -89,9 +89,11 @@ def diagnose_foreign(
     search = _searched(begun, given, refitted, options, on_round)
     found, values = search.findings, search.values
     if search.is_confirmed:
-        law = _law_instead(
-            runs, begun.problem, found.verdict, refitted, options, on_round
-        )
+        law = None
+        if not found.criteria.leaves_little(found.verdict.chosen, found.base):
+            law = _law_instead(
+                runs, begun.problem, found.verdict, refitted, options, on_round
+            )
         found, values = law or (found, values)
     told = _told(found, begun, (refitted, values))
     if not search.is_confirmed:
@@ -155,8 +157,10 @@ def _searched(
             break
         if kept is None or is_confirmed or not is_last:
             kept = this
-        if is_confirmed and found.criteria.is_nearly_all(
-            found.verdict.chosen, found.base
+        criteria, chosen = found.criteria, found.verdict.chosen
+        if is_confirmed and (
+            criteria.is_nearly_all(chosen, found.base)
+            or criteria.leaves_little(chosen, found.base)
         ):
             break
         if runs.run_tasks.are_spent:
@@ -211,12 +215,23 @@ def _found(
             return confirm(found, runs, values)
         alone = with_further_effect(alone, runs, options, on_round)
         is_told = alone.findings is not None
-        if runs.run_tasks.are_spent or (is_told and alone.is_all):
+        if runs.run_tasks.are_spent or (is_told and _is_enough(alone)):
             lead = _with_runs(unconfirmed(found), alone)
             return alone.findings or lead, alone.values, is_told
     else:
         standing = _with_nearer_spring(standing, singles, runs, on_round)
     return _of_sets(standing, options, simulation, on_round, given_sse, alone)
+
+
+def _is_enough(alone: ToldByRuns) -> bool:
+    """Whether sets that a stand-in chooses could tell no more than runs have.
+
+    A second effect was looked for in the simulation before.
+    """
+    one = alone.findings
+    if one is None:
+        return False
+    return alone.is_all or one.criteria.leaves_little(one.verdict.chosen, one.base)
 
 
 def _of_sets(

@@ -325,6 +325,17 @@ class SelectionCriteria:
             return True
         return self.excess(found) < LEAST_LAST_CONTRIBUTION * self.excess(base)
 
+    def leaves_little(self, found: CandidateFit, base: CandidateFit) -> bool:
+        """Whether what is left is hardly above the noise, and next to nothing of the gap.
+
+        Parameters
+        ----------
+        base : CandidateFit
+            Re-fitted, without further effects.
+        """
+        is_near = self.ratio(found) <= SMALL_REMAINDER
+        return is_near and self.is_small_part(found, base)
+
     def is_small_part(self, found: CandidateFit, base: CandidateFit) -> bool:
         """Whether too little is left for a name unless then nothing remains.
 
