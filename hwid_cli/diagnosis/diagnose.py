@@ -37,6 +37,7 @@ from hwid_cli.diagnosis.held_command import (
     with_held_command,
 )
 from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
+from hwid_cli.diagnosis.input_noise import LESS_NOISE, told_input_rms
 from hwid_cli.diagnosis.judgement import decided, is_lost
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
 from hwid_cli.diagnosis.laws import find_law
@@ -55,7 +56,11 @@ from hwid_cli.diagnosis.noise_filter import (
     with_noise_filter,
 )
 from hwid_cli.diagnosis.odd_recordings import with_odd_ones_trained
-from hwid_cli.diagnosis.parameters import each_sum_of_squares
+from hwid_cli.diagnosis.parameters import (
+    drives_at,
+    each_sum_of_squares,
+    residuals_at,
+)
 from hwid_cli.diagnosis.pieces_search import (
     imitates,
     judged_in_pieces,
@@ -336,7 +341,8 @@ def _behind_noise_filter(
     if not searched.has_gap or criteria.standing is not None or options.laws == "only":
         return None
     verdict = decided(rounds, searched.given_sse, searched.found)
-    if verdict.is_complete or criteria.ratio(verdict.chosen) <= STILL_LARGE:
+    is_settled = verdict.is_complete or bool(verdict.chosen.cause)
+    if is_settled or criteria.ratio(verdict.chosen) <= STILL_LARGE:
         return None
     noise = rounds.baseline.noise
     problem = with_noise_filter(rounds.problem, rounds.baseline.drive, noise)
@@ -349,9 +355,24 @@ def _behind_noise_filter(
     left = told.criteria.ratio(told.verdict.chosen)
     if told.verdict.word == "unknown" or left > MOST_LEFT_BY_SET:
         return None
+    if not _is_really_noise(again, told, noise):
+        return None
     if told.pieces is None:
         told = replace(told, other=other_command(again.rounds, told.verdict.chosen))
     return _with_both_errors(told, noise)
+
+
+def _is_really_noise(again: "_Searched", told: Findings, noise: NoiseFloor) -> bool:
+    """Whether what is left of whole recordings holds as much noise of the input as assumed.
+
+    The live command of a controller is as rough as noise, and the machine follows it.
+    """
+    whole = again.rounds.problem.without_filter()
+    fit_layout, point = rebuilt(whole, told.verdict.chosen, told.scales)
+    parts = residuals_at(whole, fit_layout, point)
+    drives = drives_at(whole, fit_layout, point)
+    found = told_input_rms(parts, whole, drives, noise)
+    return found >= LESS_NOISE * noise.input_rms
 
 
 def _with_both_errors(told: Findings, noise: NoiseFloor) -> Findings:

@@ -28,7 +28,7 @@ from hwid_cli.records.diagnosis import LEAST_SURE, SMALL_REMAINDER, NoiseFloor
 from hwid_cli.records.drive import Drive
 
 # The input's noise may be so many times what its differences show.
-_LESS_NOISE, _MORE_NOISE = 0.7, 1.3
+LESS_NOISE, _MORE_NOISE = 0.7, 1.3
 # The quietest of several stretches reads up to a quarter too low.
 _MORE_THAN_QUIET = 1.6
 # Times that the filter follows the drive that was fitted with it.
@@ -97,16 +97,39 @@ def whiteness_with_input_noise(
     # effect are neither of that size nor nearly white.
     if 1.0 < statistic <= WHITE_BY_TWO_ROUTES:
         found = share * output_rms
-        is_same = found >= _LESS_NOISE * input_rms or _is_that_of_rests(found, problem)
+        is_same = found >= LESS_NOISE * input_rms or _is_that_of_rests(found, problem)
         if is_same and filters.is_as_large(parts, share):
             return statistic / WHITE_BY_TWO_ROUTES
     return statistic
 
 
+def told_input_rms(
+    parts: Sequence[np.ndarray],
+    problem: DiagnosisProblem,
+    drives: Sequence[Drive],
+    noise: NoiseFloor,
+) -> float:
+    """Most probable noise of the input, as residuals tell it.
+
+    Parameters
+    ----------
+    parts : sequence of ndarray, shape (n_evaluated,)
+        Residuals of all recordings.
+
+    Returns
+    -------
+    float, [input unit]
+        At most 1.3 times what differences of the input show.
+    """
+    filters = _Filters(problem, drives, noise.rms, _Levels.of(problem, noise))
+    most = _MORE_NOISE * noise.input_rms / noise.rms
+    return filters.likeliest(parts, most) * noise.rms
+
+
 def _is_that_of_rests(input_rms: float, problem: DiagnosisProblem) -> bool:
     """Whether noise of the input is of the size that its quietest stretches show."""
     quiet = quiet_input_rms(problem)
-    return _LESS_NOISE * quiet <= input_rms <= _MORE_THAN_QUIET * quiet
+    return LESS_NOISE * quiet <= input_rms <= _MORE_THAN_QUIET * quiet
 
 
 def _are_alike(white: Sequence[np.ndarray]) -> bool:
@@ -362,7 +385,7 @@ class _Filters:
         expected, chance = self._expected(parts, share, output)
         excess = self._sum_of_squares(parts) - output * _count(parts)
         most = max((_MORE_NOISE**2 - 1.0) * expected, chance)
-        least = max((1.0 - _LESS_NOISE**2) * expected, chance)
+        least = max((1.0 - LESS_NOISE**2) * expected, chance)
         return bool(-least <= excess - expected <= most)
 
     def may_be_as_large(self, parts: Sequence[np.ndarray], share: float) -> bool:

@@ -273,6 +273,11 @@ class DiagnosisProblem:
         """Whether noise of the input is taken out of what a simulation leaves."""
         return any(one.noise_filter is not None for one in self.signals)
 
+    def without_filter(self) -> "DiagnosisProblem":
+        """The same, judged by whole recordings as they are."""
+        signals = tuple(replace(one, noise_filter=None) for one in self.signals)
+        return replace(self, signals=signals)
+
     @property
     def has_starts(self) -> bool:
         """Whether it is known how each recording starts, exactly."""

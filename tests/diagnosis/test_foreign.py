@@ -802,6 +802,8 @@ class Some:
     verdict: object = None
     found: object = None
     fits: object = None
+    base: object = None
+    criteria: object = SimpleNamespace(leaves_little=lambda *_: False)
 
 
 def replaced_findings(word, fits):

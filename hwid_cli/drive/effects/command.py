@@ -6,7 +6,7 @@ docs/method_diagnosis.md, eq. (D4) to (D7).
 from math import inf, pi
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from hwid_cli.drive.effect import (
     NOT_NEGATIVE,
@@ -181,7 +181,9 @@ def _iron(values: Values) -> float:
     left = 1.0 - values["loss_at_reference"]
     if left > 1.0 - 1e-9:
         return 0.0
-    return float(brentq(lambda z: np.tanh(z) / z - left, 1e-6, 20.0, xtol=1e-13))
+    return float(
+        scipy.optimize.brentq(lambda z: np.tanh(z) / z - left, 1e-6, 20.0, xtol=1e-13)
+    )
 
 
 IRON_SATURATION = Effect(
