@@ -1,6 +1,6 @@
 """Diagnosis of simulations that cannot be opened, against machines of their own making."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -803,7 +803,9 @@ class Some:
     found: object = None
     fits: object = None
     base: object = None
-    criteria: object = SimpleNamespace(leaves_little=lambda *_: False)
+    criteria: object = field(
+        default_factory=lambda: SimpleNamespace(leaves_little=lambda *_: False)
+    )
 
 
 def replaced_findings(word, fits):
