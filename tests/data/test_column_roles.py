@@ -453,6 +453,14 @@ def test_an_output_that_has_nothing_to_do_with_the_input_gives_way():
     )
     assert (first, last) == ("Strom", "Moment")
     assert "'Drehzahl' has nothing to do with the input" in found.reasons["output"]
+    # A temperature answers as well, and is hardly ever meant.
+    first, last, _ = guessed(
+        ("Strom", VOLTAGE, "A"),
+        ("Drehzahl", steady, "1/min"),
+        ("Temperatur", SPEED, "K"),
+        ("Moment", SPEED + 1e-3 * rng.normal(size=N), "Nm"),
+    )
+    assert (first, last) == ("Strom", "Moment")
     # Where no other column answers, the name holds.
     other = rng.normal(size=N)
     first, last, _ = guessed(

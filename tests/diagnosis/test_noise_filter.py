@@ -4,8 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 
 from hwid_cli.diagnosis.diagnose import diagnose
+from hwid_cli.diagnosis.innovations import answer
+from hwid_cli.diagnosis.input_noise import LESS_NOISE, told_input_rms
 from hwid_cli.diagnosis.noise_filter import FilteredTasks, with_noise_filter
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.tasks import DiagnosisTask
@@ -126,6 +129,21 @@ def test_many_states_near_one_another_keep_their_digits():
     assert np.abs(np.linalg.eigvals(found.change)).max() < 1.0
 
 
+@pytest.mark.parametrize(("is_noisy", "is_told"), [(True, True), (False, False)])
+def test_residuals_tell_whether_the_roughness_of_an_input_is_noise(is_noisy, is_told):
+    of, noise = replace(problem(), drive=FREE), floor(0.02)
+    rng = np.random.default_rng(5)
+    one = straight_drive(FREE, of.signals[0].sample_time_s)
+    parts = []
+    for signals in of.signals:
+        n = signals.n_evaluated
+        u = 0.02 * is_noisy * rng.standard_normal(n)
+        moved = answer(one.a, one.b, one.c[0].copy(), one.through, u)
+        parts.append(moved + noise.rms * rng.standard_normal(n))
+    told = told_input_rms(parts, of, [FREE] * len(parts), noise)
+    assert (told >= LESS_NOISE * noise.input_rms) is is_told
+
+
 def test_tasks_behind_the_filter_are_no_others():
     asked = []
 
@@ -140,7 +158,7 @@ def test_tasks_behind_the_filter_are_no_others():
     assert asked == [({"effects": (), "filter": "noise"}, 1)]
 
 
-def moved(wanted, seed):
+def moved(wanted, seed, magnets_N=(10.0, 3.5), friction_N=0.0):
     """A stage over two rows of magnets, under a position controller, in 20 steps a sample.
 
     The logger reads the current with noise and the scale in steps of 1 um.
@@ -153,9 +171,10 @@ def moved(wanted, seed):
         total = np.clip(total + 6.0 * STEP_S * error, -0.05, 0.05)
         current[k], place[k] = 108.0 * (error + total), x
         for _ in range(20):
-            magnets = 10.0 * np.sin(2 * np.pi * x / 0.032 + 0.7)
-            magnets += 3.5 * np.sin(2 * np.pi * x / 0.0135 - 0.4)
-            v += STEP_S / 20 * (35.0 * current[k] - 200.0 * v + magnets) / 95.0
+            other = magnets_N[0] * np.sin(2 * np.pi * x / 0.032 + 0.7)
+            other += magnets_N[1] * np.sin(2 * np.pi * x / 0.0135 - 0.4)
+            other -= friction_N * np.tanh(v / 4e-4)
+            v += STEP_S / 20 * (35.0 * current[k] - 200.0 * v + other) / 95.0
             x += STEP_S / 20 * v
     noisy = current + 0.01 * rng.standard_normal(N)
     steps = np.round((place + 3e-7 * rng.standard_normal(N)) * 1e6) / 1e6
@@ -199,3 +218,37 @@ def test_two_rows_of_magnets_are_told_far_below_what_noise_of_the_current_adds_u
     (said,) = (one for one in found.warnings if "behind a filter" in one)
     # Whole recordings differ by what the noise has added up to.
     assert "at last" in said
+
+
+@pytest.mark.thorough
+def test_a_clean_axis_with_friction_lacks_nothing_where_noise_decides_when_it_lets_go():
+    t = STEP_S * np.arange(N)
+    wanted = [
+        0.12 * np.sin(2 * np.pi * 0.5 * np.maximum(t - 0.2, 0)),
+        0.04 - 0.04 * np.cos(np.pi * np.clip((t - 0.3) / 1.2, 0, 1)),
+        0.08 * scipy.signal.sawtooth(2 * np.pi * 0.25 * t, 0.5) + 0.08,
+        0.06 * np.sin(2 * np.pi * 0.8 * np.maximum(t - 0.4, 0)),
+    ]
+    found = diagnose(
+        [moved(one, seed, (0.0, 0.0), 20.0) for seed, one in enumerate(wanted)],
+        SimulationOptions(
+            mass_kg=95.0,
+            damping_N_s_per_m=225.0,
+            stiffness_N_per_m=0.0,
+            force_constant_N_per_A=33.5,
+            hold="zero",
+            effects={"coulomb_friction": {"force_N": 22.0}},
+        ),
+        DiagnoseOptions(effects=("position_friction", "quadratic_drag")),
+        in_turn,
+        lambda *_: None,
+    )
+    assert found.verdict == "parameters"
+    assert {one.name: one.after for one in found.base} == pytest.approx(
+        {
+            "damping_N_s_per_m": 200.0,
+            "stiffness_N_per_m": 0.0,
+            "force_constant_N_per_A": 35.0,
+        },
+        rel=2e-3,
+    )

@@ -87,6 +87,10 @@ def test_the_model_of_all_is_forecast_as_a_range_of_what_its_maps_may_be(tmp_pat
     # Each recording but that of the test is left out once; six orders of linear models.
     assert plan.bands == (4 * 1.0, 4 * 4.0)
     assert plan.linear == 6 * 0.5
+    # Of many recordings linear models are fitted to eight.
+    many = (*recordings_of((1000,) * 4), *recordings_of((1000,) * 13)[5:])
+    wide = joint_seconds.joint_plan(given.experiment, many, COST)
+    assert wide.linear == pytest.approx(6 * 0.5 * 8 / len(many))
 
 
 def test_stages_that_follow_count_the_fits_of_the_model_of_all(tmp_path):
