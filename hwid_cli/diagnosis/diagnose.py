@@ -37,7 +37,6 @@ from hwid_cli.diagnosis.held_command import (
     with_held_command,
 )
 from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
-from hwid_cli.diagnosis.input_noise import LESS_NOISE, told_input_rms
 from hwid_cli.diagnosis.judgement import decided, is_lost
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
 from hwid_cli.diagnosis.laws import find_law
@@ -52,15 +51,12 @@ from hwid_cli.diagnosis.next_experiment import (
 from hwid_cli.diagnosis.noise_filter import (
     FilteredTasks,
     filtered_sentence,
+    holds_that_noise,
     plain_errors_sentence,
     with_noise_filter,
 )
 from hwid_cli.diagnosis.odd_recordings import with_odd_ones_trained
-from hwid_cli.diagnosis.parameters import (
-    drives_at,
-    each_sum_of_squares,
-    residuals_at,
-)
+from hwid_cli.diagnosis.parameters import each_sum_of_squares
 from hwid_cli.diagnosis.pieces_search import (
     imitates,
     judged_in_pieces,
@@ -355,24 +351,12 @@ def _behind_noise_filter(
     left = told.criteria.ratio(told.verdict.chosen)
     if told.verdict.word == "unknown" or left > MOST_LEFT_BY_SET:
         return None
-    if not _is_really_noise(again, told, noise):
+    whole = again.rounds.problem.without_filter()
+    if not holds_that_noise(whole, told.verdict.chosen, told.scales, noise):
         return None
     if told.pieces is None:
         told = replace(told, other=other_command(again.rounds, told.verdict.chosen))
     return _with_both_errors(told, noise)
-
-
-def _is_really_noise(again: "_Searched", told: Findings, noise: NoiseFloor) -> bool:
-    """Whether what is left of whole recordings holds as much noise of the input as assumed.
-
-    The live command of a controller is as rough as noise, and the machine follows it.
-    """
-    whole = again.rounds.problem.without_filter()
-    fit_layout, point = rebuilt(whole, told.verdict.chosen, told.scales)
-    parts = residuals_at(whole, fit_layout, point)
-    drives = drives_at(whole, fit_layout, point)
-    found = told_input_rms(parts, whole, drives, noise)
-    return found >= LESS_NOISE * noise.input_rms
 
 
 def _with_both_errors(told: Findings, noise: NoiseFloor) -> Findings:

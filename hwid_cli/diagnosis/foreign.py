@@ -88,12 +88,10 @@ def diagnose_foreign(
         given = runs.of(signals, refitted)
     search = _searched(begun, given, refitted, options, on_round)
     found, values = search.findings, search.values
-    if search.is_confirmed:
-        law = None
-        if not found.criteria.leaves_little(found.verdict.chosen, found.base):
-            law = _law_instead(
-                runs, begun.problem, found.verdict, refitted, options, on_round
-            )
+    if search.is_confirmed and not _is_all_but_nothing(found):
+        law = _law_instead(
+            runs, begun.problem, found.verdict, refitted, options, on_round
+        )
         found, values = law or (found, values)
     told = _told(found, begun, (refitted, values))
     if not search.is_confirmed:
@@ -157,11 +155,8 @@ def _searched(
             break
         if kept is None or is_confirmed or not is_last:
             kept = this
-        criteria, chosen = found.criteria, found.verdict.chosen
-        if is_confirmed and (
-            criteria.is_nearly_all(chosen, found.base)
-            or criteria.leaves_little(chosen, found.base)
-        ):
+        is_all = found.criteria.is_nearly_all(found.verdict.chosen, found.base)
+        if is_confirmed and (is_all or _is_all_but_nothing(found)):
             break
         if runs.run_tasks.are_spent:
             break
@@ -229,9 +224,12 @@ def _is_enough(alone: ToldByRuns) -> bool:
     A second effect was looked for in the simulation before.
     """
     one = alone.findings
-    if one is None:
-        return False
-    return alone.is_all or one.criteria.leaves_little(one.verdict.chosen, one.base)
+    return one is not None and (alone.is_all or _is_all_but_nothing(one))
+
+
+def _is_all_but_nothing(found: Findings) -> bool:
+    """Whether what is chosen leaves next to nothing, whatever shape that has."""
+    return found.criteria.leaves_next_to_nothing(found.verdict.chosen, found.base)
 
 
 def _of_sets(

@@ -12,11 +12,16 @@ from typing import Any
 
 import numpy as np
 
+from hwid_cli.diagnosis.candidate import rebuilt
 from hwid_cli.diagnosis.innovations import StationaryFilter
+from hwid_cli.diagnosis.input_noise import LESS_NOISE, told_input_rms
 from hwid_cli.diagnosis.noise import noise_levels
+from hwid_cli.diagnosis.parameters import drives_at, residuals_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.tasks import DiagnosisTask, RunTasks
 from hwid_cli.diagnosis.whitening_filters import noisy_drives
+from hwid_cli.drive.effect import Scales
+from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Drive
 
@@ -53,6 +58,26 @@ def with_noise_filter(
     )
     is_whole = len(signals) == len(problem.signals)
     return replace(problem, signals=signals) if is_whole else None
+
+
+def holds_that_noise(
+    whole: DiagnosisProblem, found: CandidateFit, scales: Scales, noise: NoiseFloor
+) -> bool:
+    """Whether what is left of whole recordings holds as much noise of the input as assumed.
+
+    The live command of a controller is as rough as noise, and the machine follows it.
+
+    Parameters
+    ----------
+    whole : DiagnosisProblem
+        Without the filter.
+    noise : NoiseFloor
+        That the filter is made for.
+    """
+    fit_layout, point = rebuilt(whole, found, scales)
+    parts = residuals_at(whole, fit_layout, point)
+    told = told_input_rms(parts, whole, drives_at(whole, fit_layout, point), noise)
+    return told >= LESS_NOISE * noise.input_rms
 
 
 def filtered_sentence(noise: NoiseFloor, input_unit: str) -> str:

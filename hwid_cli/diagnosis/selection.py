@@ -325,7 +325,7 @@ class SelectionCriteria:
             return True
         return self.excess(found) < LEAST_LAST_CONTRIBUTION * self.excess(base)
 
-    def leaves_little(self, found: CandidateFit, base: CandidateFit) -> bool:
+    def leaves_next_to_nothing(self, found: CandidateFit, base: CandidateFit) -> bool:
         """Whether what is left is hardly above the noise, and next to nothing of the gap.
 
         Parameters

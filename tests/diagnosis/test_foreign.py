@@ -553,7 +553,10 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
     def stub(is_confirmed):
         chosen = SimpleNamespace(sse=np.array([float(left[len(begun) - 1])]))
         verdict = SimpleNamespace(chosen=chosen, word="unknown")
-        no = {"is_nearly_all": lambda *_: False, "leaves_little": lambda *_: False}
+        no = {
+            "is_nearly_all": lambda *_: False,
+            "leaves_next_to_nothing": lambda *_: False,
+        }
         criteria = SimpleNamespace(**no)
         return SimpleNamespace(
             verdict=verdict, criteria=criteria, base=None, is_confirmed=is_confirmed
@@ -804,7 +807,7 @@ class Some:
     fits: object = None
     base: object = None
     criteria: object = field(
-        default_factory=lambda: SimpleNamespace(leaves_little=lambda *_: False)
+        default_factory=lambda: SimpleNamespace(leaves_next_to_nothing=lambda *_: False)
     )
 
 

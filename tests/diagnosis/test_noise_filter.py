@@ -13,14 +13,19 @@ from hwid_cli.diagnosis.noise_filter import FilteredTasks, with_noise_filter
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.tasks import DiagnosisTask
 from hwid_cli.diagnosis.whitening_filters import straight_drive
-from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
 from tests.diagnosis.small_drive import DRIVE, in_turn, problem, white
 
 FREE = replace(DRIVE, stiffness_N_per_m=0.0)
-AXIS = Drive(95.0, 204.0, 0.0, 35.0, hold="zero")
 STEP_S, N = 2e-3, 2000
+STAGE = SimulationOptions(
+    mass_kg=95.0,
+    damping_N_s_per_m=225.0,
+    stiffness_N_per_m=0.0,
+    force_constant_N_per_A=33.5,
+    hold="zero",
+)
 
 
 def floor(input_rms):
@@ -196,13 +201,7 @@ def test_two_rows_of_magnets_are_told_far_below_what_noise_of_the_current_adds_u
     ]
     found = diagnose(
         [moved(one, seed) for seed, one in enumerate(wanted)],
-        SimulationOptions(
-            mass_kg=95.0,
-            damping_N_s_per_m=225.0,
-            stiffness_N_per_m=0.0,
-            force_constant_N_per_A=33.5,
-            hold="zero",
-        ),
+        STAGE,
         DiagnoseOptions(effects=("cogging", "coulomb_friction", "input_delay")),
         in_turn,
         lambda *_: None,
@@ -231,14 +230,7 @@ def test_a_clean_axis_with_friction_lacks_nothing_where_noise_decides_when_it_le
     ]
     found = diagnose(
         [moved(one, seed, (0.0, 0.0), 20.0) for seed, one in enumerate(wanted)],
-        SimulationOptions(
-            mass_kg=95.0,
-            damping_N_s_per_m=225.0,
-            stiffness_N_per_m=0.0,
-            force_constant_N_per_A=33.5,
-            hold="zero",
-            effects={"coulomb_friction": {"force_N": 22.0}},
-        ),
+        replace(STAGE, effects={"coulomb_friction": {"force_N": 22.0}}),
         DiagnoseOptions(effects=("position_friction", "quadratic_drag")),
         in_turn,
         lambda *_: None,

@@ -1101,4 +1101,4 @@ def test_a_curved_spring_and_a_stop_are_one_law_while_something_remains(spring, 
     [(110.0, 9000.0, True), (110.0, 400.0, False), (160.0, 90_000.0, False)],
 )
 def test_little_is_near_the_noise_and_next_to_nothing_of_the_gap(left, of, is_little):
-    assert CRITERIA.leaves_little(made_up(GOOD, left), base(of)) is is_little
+    assert CRITERIA.leaves_next_to_nothing(made_up(GOOD, left), base(of)) is is_little
