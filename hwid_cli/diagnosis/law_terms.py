@@ -191,6 +191,9 @@ def _thresholds(scales: Scales) -> Iterator[Term]:
     for share in _BENDS:
         a = {"a": (share * scales.displacement_m, "m")}
         yield Term("tanh(x/a)", (0, 0, 0), a, "levels off")
+        # Air, magnetic and contact forces near a wall, on either side.
+        yield Term("exp(-x/a)", (0, 0, 0), a, "fades along the way")
+        yield Term("exp(x/a)", (0, 0, 0), a, "grows along the way")
     yield Term("Heaviside(x)*sign(v)", (0, 0, 0))
     yield Term("Heaviside(v)*v**2", (2, -2, 0))
 

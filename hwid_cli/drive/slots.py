@@ -140,5 +140,6 @@ that is switched off is 0, except where the comment says infinite.
     BRISTLE_EXCESS,
     SENSOR_LAG_DAMPING_RATIO,
     IRON,  # how far iron is driven at the reference current
+    IS_STRIBECK_EXPONENTIAL,  # 1 where the excess falls as exp(-|v| / vs)
     N_SLOTS,
-) = range(133)
+) = range(134)

@@ -56,6 +56,9 @@ LAWS = {
     "stribeck_friction": _Law(
         "-({force_N} + {static_excess_N}*exp(-(v/{velocity_m_per_s})^2))*s"
     ),
+    "stribeck_friction:exponential": _Law(
+        "-({force_N} + {static_excess_N}*exp(-abs(v)/{velocity_m_per_s}))*s"
+    ),
     "position_friction": _Law(
         "-{force_N}*(1 + {variation_share}*sin(2*pi*x/{period_m} + {phase_rad}))*s"
     ),

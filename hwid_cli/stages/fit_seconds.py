@@ -39,9 +39,12 @@ _MOST_TIMED = 10_000
 # are searched for too, in the later ones, and both for groups that begin with the models
 # of their members (docs/benchmarks.md, "A campaign" and "Groups of recordings"), [-].
 _SEARCHED, _CONTINUED, _WARM_SEARCHED, _WARM_CONTINUED = 0.5, 0.2, 0.25, 0.1
-# So many fits of maps that are compared are timed, on as many recordings at most: whether a
+# So many fits of maps that are compared are timed at least, on as many recordings at most: whether a
 # fit is searched again depends on the recording more than on the maps, [-].
 _TIMED_MAPS, _TIMED_RECORDINGS = 5, 10
+# More of them are timed for so long, [s]; and how many standard errors their mean may be
+# off, [-].
+_MOST_SECONDS_OF_MAPS, _DEVIATIONS = 1.5, 2.0
 # Keeping the result of a task, [s].
 TASK_SECONDS = 0.005
 # Simulating one model on one sample, its initial state included (docs/benchmarks.md: 1 ms
@@ -315,19 +318,21 @@ def map_seconds(
     orders: OrdersOptions,
     recordings: Sequence[Recording],
     maps: Sequence[FitOptions],
-) -> float:
+) -> tuple[float, float]:
     """Time of fits with several pairs of maps on one core; their orders are not known yet.
 
-    Where fits are timed, so are five to ten of these, each with the next recording and the
-    next maps.
+    Where fits are timed, so are some of these, each with the next recording and the next
+    maps: one is fitted at once where another takes twenty times as long, so there are as
+    many as a second or two holds, and what the rest takes is a range.
 
     Returns
     -------
-    float, [s]
+    tuple of float, [s]
+        At least and at most.
     """
     middle = middle_orders(orders)
     if not cost.rounds:
-        return sum(
+        seconds = sum(
             fit_seconds(
                 cost,
                 middle,
@@ -337,16 +342,62 @@ def map_seconds(
             for one in recordings
             for options in maps
         )
-    timed = recordings[:: math.ceil(len(recordings) / _TIMED_RECORDINGS)]
-    n_timed = min(max(_TIMED_MAPS, len(timed)), len(maps))
-    each = [
-        _seconds_per_work(
-            timed[number % len(timed)], middle, maps[number * len(maps) // n_timed]
-        )
-        for number in range(n_timed)
-    ]
+        return seconds, seconds
     works = [_work(one.n_samples) for one in recordings]
-    return sum(each) / len(each) * sum(works) * len(maps)
+    each = _timed_maps(middle, recordings, maps)
+    # The mean of those that are timed is not that of all.
+    doubt = (
+        _DEVIATIONS * float(np.std(each, ddof=1)) / len(each) ** 0.5
+        if each[1:]
+        else 0.0
+    )
+    mean = sum(each) / len(each)
+    least, most = max(mean - doubt, mean / 2), mean + doubt
+    slower = order_range(orders)[1]
+    return least * sum(works) * len(maps), most * slower * sum(works) * len(maps)
+
+
+def _timed_maps(
+    orders: Orders, recordings: Sequence[Recording], maps: Sequence[FitOptions]
+) -> list[float]:
+    """Times of some fits, as parts of what recordings of their length are to take."""
+    timed = recordings[:: math.ceil(len(recordings) / _TIMED_RECORDINGS)]
+    least = min(max(_TIMED_MAPS, len(timed)), len(maps))
+    # Every pair once, then the next recording with each.
+    pairs = [
+        (timed[(number + turn) % len(timed)], maps[number * len(maps) // least])
+        for turn in range(len(timed))
+        for number in range(least)
+    ]
+    each: list[float] = []
+    start = time.process_time()
+    for recording, options in pairs:
+        if len(each) >= least and time.process_time() - start > _MOST_SECONDS_OF_MAPS:
+            break
+        each.append(_seconds_per_work(recording, orders, options))
+    return each
+
+
+def order_range(orders: OrdersOptions) -> tuple[float, float]:
+    """Times of a fit of the smallest and of the largest orders over that of middle ones.
+
+    Returns
+    -------
+    tuple of float, [-]
+
+    Examples
+    --------
+    >>> least, most = order_range(OrdersOptions(nb=(1, 2, 3), nk=(1, 2, 3)))
+    >>> round(least, 2), round(most, 2)
+    (0.69, 1.24)
+    """
+    sizes = [(one.nb + one.nf) / 2 for _, _, one in candidate_orders(orders)]
+    middle = middle_orders(orders)
+    size = max((middle.nb + middle.nf) / 2, 1.0)
+    least, most = (
+        (max(one, 1.0) / size) ** _P_ORDERS for one in (min(sizes), max(sizes))
+    )
+    return least, most
 
 
 def _seconds_per_work(

@@ -21,6 +21,7 @@ from hwid_cli.stages.fit_seconds import (
     fit_seconds,
     livelier_part,
     middle_orders,
+    order_range,
 )
 from hwid_cli.stages.linear_reference import MOST_JOINED_LINEAR, linear_options
 from hwid_cli.stages.order_grid import candidate_orders
@@ -160,10 +161,11 @@ def joint_plan(
     )
     # Nothing else judges a model of all: each recording is left out once more.
     n_left_out = min(len(own), MOST_JUDGES)
+    faster, slower = order_range(experiment.orders)
     return JointSeconds(
         n_fits,
         (least, most),
-        (n_left_out * extremes[0], n_left_out * extremes[1]),
+        (n_left_out * extremes[0] * faster, n_left_out * extremes[1] * slower),
         linear * n_grid * min(1.0, MOST_JOINED_LINEAR / len(own)),
     )
 

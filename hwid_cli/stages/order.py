@@ -359,14 +359,17 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         return ()
     chosen = recordings_with_models(planning.recordings, experiment)
     total = len(chosen) * len(maps)
-    seconds = map_seconds(planning.cost, experiment.orders, chosen, maps)
+    least, most = map_seconds(planning.cost, experiment.orders, chosen, maps)
     what = (
         f"{counted(len(chosen), 'recording')} x {len(maps)} pairs of maps = "
         f"{counted(total, 'fit')}"
     )
-    per_process = seconds / planning.workers
-    size = FIT_BYTES * total
-    return (StagePlan("order", what, total, None, per_process, size, is_shared=True),)
+    least, most = least / planning.workers, most / planning.workers
+    size, reason = FIT_BYTES * total, "large orders are best, and more fits are slow"
+    plan = StagePlan(
+        "order", what, total, None, least, size, most, reason, is_shared=True
+    )
+    return (plan,)
 
 
 STAGE = Stage(

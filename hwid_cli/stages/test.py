@@ -460,7 +460,7 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     elif together := joint_plan(experiment, planning.recordings, planning.cost):
         # One task: its fits are not shared.
         least, most = (least + one for one in together.bands)
-        reason = "the maps that fit slowest are chosen"
+        reason = "the maps and orders that fit slowest are chosen"
     what, size = counted(n, "recording"), n * PAIR_BYTES
     return (StagePlan(NAME, what, n, None, least, size, most, reason),)
 

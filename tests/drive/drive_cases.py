@@ -21,6 +21,9 @@ STRIBECK = {
         "velocity_m_per_s": 0.01,
     }
 }
+FALLING = {
+    "stribeck_friction": {**STRIBECK["stribeck_friction"], "curve": "exponential"}
+}
 HYSTERESIS = {"hysteresis": {"force_N": 0.8, "yield_m": 2e-4}}
 BRISTLES = {
     "hysteresis": {
@@ -208,6 +211,8 @@ TOGETHER = (
     TWO_STOPS | COULOMB,
     TWO_STOPS | SPRING_LOAD,
     BOUC_WEN | COULOMB,
+    FALLING,
+    FALLING | CUBIC,
 )
 # The oracle stops at many events here, or follows a stiff pair of masses.
 TOGETHER_SLOW = (

@@ -167,7 +167,10 @@ class _Run:
         level += one.value("stribeck_friction", "force_N")
         excess = one.value("stribeck_friction", "static_excess_N")
         slow = one.value("stribeck_friction", "velocity_m_per_s", 1.0)
-        level += excess * math.exp(-((v / slow) ** 2))
+        # Bo and Pavelescu (1982): an exponent of 1 for some pairs of materials, 2 for others.
+        curve = one.value("stribeck_friction", "curve", "gaussian")
+        exponent = 1 if curve == "exponential" else 2
+        level += excess * math.exp(-(abs(v / slow) ** exponent))
         if one.has("position_friction"):
             share = one.value("position_friction", "variation_share")
             angle = 2 * math.pi * y[X] / one.value("position_friction", "period_m")

@@ -39,6 +39,9 @@ VALUES = {
     "stribeck_friction": {
         "force_N": 0.5, "static_excess_N": 0.6, "velocity_m_per_s": 0.05,
     },
+    "stribeck_friction:exponential": {
+        "force_N": 0.5, "static_excess_N": 0.6, "velocity_m_per_s": 0.05,
+    },
     "position_friction": {
         "force_N": 0.8, "variation_share": 0.5, "period_m": 0.008, "phase_rad": 0.4,
     },

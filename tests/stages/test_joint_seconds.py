@@ -9,6 +9,7 @@ import pytest
 from hwid_cli.cli import check
 from hwid_cli.config.load import load_experiment
 from hwid_cli.records.check import FitCost
+from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 from hwid_cli.stages import fit_seconds, joint_seconds
@@ -85,7 +86,9 @@ def test_the_model_of_all_is_forecast_as_a_range_of_what_its_maps_may_be(tmp_pat
     most = (before + 21) * mean + of_orders * 4.0
     assert plan.search[1] == pytest.approx(most + 0.005 * plan.n_fits)
     # Each recording but that of the test is left out once; six orders of linear models.
-    assert plan.bands == (4 * 1.0, 4 * 4.0)
+    # Their orders are not known: 1 to 2.5 coefficients of each kind, of which 2 are timed.
+    smallest, largest = (1.0 / 2.0) ** 0.54, (2.5 / 2.0) ** 0.54
+    assert plan.bands == pytest.approx((4 * 1.0 * smallest, 4 * 4.0 * largest))
     assert plan.linear == 6 * 0.5
     # Of many recordings linear models are fitted to eight.
     many = (*recordings_of((1000,) * 4), *recordings_of((1000,) * 13)[5:])
@@ -100,8 +103,8 @@ def test_stages_that_follow_count_the_fits_of_the_model_of_all(tmp_path):
     plan = joint_seconds.joint_plan(given.experiment, given.recordings, COST)
     assert group.seconds == pytest.approx(plan.search[0] / 2, rel=0.1)
     # The bands are one task, so a second process does not help.
-    assert tested.seconds == pytest.approx(4.0, abs=0.1)
-    assert tested.longest_seconds == pytest.approx(16.0, abs=0.1)
+    assert tested.seconds == pytest.approx(plan.bands[0], abs=0.1)
+    assert tested.longest_seconds == pytest.approx(plan.bands[1], abs=0.1)
     alone = planning(tmp_path, group="group: {together: false}")
     more = page_plan(given).seconds - page_plan(alone).seconds
     assert more == pytest.approx(3.0 / 2, rel=0.5)
@@ -115,7 +118,7 @@ def test_without_timing_a_joint_fit_is_scaled_from_one_of_a_recording(tmp_path):
         given.experiment, given.recordings, fit_seconds.MEASURED
     )
     assert plan.search[0] < plan.search[1]
-    assert plan.bands[0] == plan.bands[1] > 0.0
+    assert 0.0 < plan.bands[0] < plan.bands[1]
 
 
 def test_nothing_is_timed_where_nothing_is_fitted_together(tmp_path, monkeypatch):
@@ -139,10 +142,38 @@ def test_each_recording_has_a_say_in_how_long_maps_take(monkeypatch):
         fit_seconds, "time", SimpleNamespace(process_time=lambda: clock[0])
     )
     maps = [FitOptions(input_units=n) for n in range(2, 10)]
-    orders = SimpleNamespace(nb=(2,), nk=(2,), nk_role="poles", nf=None)
-    found = fit_seconds.map_seconds(COST, orders, recordings_of((1000,) * 8), maps)
-    assert found == pytest.approx(8 * 4.0)
+    orders = OrdersOptions(nb=(2,), nk=(2,))
+    least, most = fit_seconds.map_seconds(
+        COST, orders, recordings_of((1000,) * 8), maps
+    )
+    # One of eight: 4 s on a recording, 0.5 s on the mean, known to 0.5 s.
+    assert (least, most) == pytest.approx((8 * 8 * 0.25, 8 * 8 * 1.5))
     assert fitted == [(f"run_{row}", 2 + row) for row in range(8)]
+
+
+def test_maps_are_timed_for_more_than_a_second(monkeypatch):
+    clock, fitted = [0.0], []
+
+    def fit(recordings, orders, options):
+        fitted.append((recordings[0].name, options.input_units))
+        clock[0] += 0.0625 if len(fitted) % 2 else 0.0
+
+    monkeypatch.setattr(fit_seconds, "fit", fit)
+    monkeypatch.setattr(
+        fit_seconds, "time", SimpleNamespace(process_time=lambda: clock[0])
+    )
+    maps = [FitOptions(input_units=n) for n in range(2, 10)]
+    orders = OrdersOptions(nb=(1, 2, 4), nk=(2,))
+    least, most = fit_seconds.map_seconds(
+        COST, orders, recordings_of((1000,) * 8), maps
+    )
+    # Each with each other until 1.5 s have gone.
+    assert len(fitted) == len(set(fitted)) == 49
+    assert fitted[8] == ("run_1", 2)
+    mean = 25 * 0.0625 / 49
+    assert least / 64 < mean < most / 64
+    # Larger orders take longer: a mean of 3 coefficients for 2.
+    assert most / 64 > mean * 1.2
 
 
 def test_nothing_is_timed_and_no_linear_model_planned_where_nothing_is_fitted(

@@ -105,6 +105,20 @@ STRIBECK = Effect(
     contains=("coulomb_friction",),
 )
 
+STRIBECK_EXPONENTIAL = replace(
+    STRIBECK,
+    id="stribeck_friction:exponential",
+    equation="F = -(Fc + dFs exp(-|v|/vs)) sgn(v)",
+    derived={"IS_STRIBECK_EXPONENTIAL": lambda values: 1.0},
+    stated=(
+        Stated("force_N", limits=(NOT_NEGATIVE,)),
+        Stated("static_excess_N"),
+        Stated("velocity_m_per_s", limits=(POSITIVE,)),
+        Stated("curve", words=("exponential",), is_needed=False),
+    ),
+    words={"curve": "exponential"},
+)
+
 HYSTERESIS = Effect(
     id="hysteresis",
     sentence="friction that builds up over a short way after each reversal",
@@ -333,6 +347,7 @@ EFFECTS = (
     COULOMB,
     ASYMMETRIC,
     STRIBECK,
+    STRIBECK_EXPONENTIAL,
     *LOAD,
     POSITION,
     HYSTERESIS,

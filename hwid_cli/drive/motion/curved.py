@@ -15,6 +15,7 @@ from hwid_cli.drive.motion.forces import (
     own_force,
     resisting,
     ripple,
+    speed_of_excess,
 )
 from hwid_cli.drive.motion.hysteresis import YIELDED, bristle_level, yielding
 from hwid_cli.drive.motion.push import (
@@ -81,7 +82,7 @@ def is_curved_here(state: np.ndarray, memory: np.ndarray, p: np.ndarray) -> bool
     """
     if p[slots.STATIC_EXCESS] != 0.0:
         speed = memory[WAY] * state[V]
-        if memory[WAY] != 0.0 and speed < FAST * p[slots.STRIBECK_VELOCITY]:
+        if memory[WAY] != 0.0 and speed < speed_of_excess(FAST, p):
             return True
     if p[slots.HYSTERESIS_FORCE] != 0.0 and memory[WAY] != 0.0:
         if p[slots.HAS_SHAPE] != 0.0 and memory[WAY] != memory[DEFLECTION]:
@@ -229,10 +230,11 @@ def step_limit(
     if p[slots.BRISTLE_EXCESS] != 0.0 and speed < FAST * slow:
         pull = abs(acceleration(state, memory, push, done, p)[0])
         rate += 0.5 * pull / slow
-    slow = p[slots.STRIBECK_VELOCITY]
-    if p[slots.STATIC_EXCESS] != 0.0 and memory[WAY] != 0.0 and speed < FAST * slow:
-        pull = abs(acceleration(state, memory, push, done, p)[0])
-        rate += abs(p[slots.STATIC_EXCESS]) / (mass * slow) + 0.5 * pull / slow
+    if p[slots.STATIC_EXCESS] != 0.0 and memory[WAY] != 0.0:
+        slow = p[slots.STRIBECK_VELOCITY]
+        if speed < speed_of_excess(FAST, p):
+            pull = abs(acceleration(state, memory, push, done, p)[0])
+            rate += abs(p[slots.STATIC_EXCESS]) / (mass * slow) + 0.5 * pull / slow
     return LONGEST_PHASE / max(rate, 1e-9)
 
 

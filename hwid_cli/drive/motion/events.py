@@ -9,7 +9,13 @@ from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
 from hwid_cli.drive.motion.corners import corner_of, margin
 from hwid_cli.drive.motion.curved import is_curved_here, step_all, step_plain
-from hwid_cli.drive.motion.forces import acceleration, held_further, moved_mass, surplus
+from hwid_cli.drive.motion.forces import (
+    acceleration,
+    held_further,
+    moved_mass,
+    speed_of_excess,
+    surplus,
+)
 from hwid_cli.drive.motion.hysteresis import yielded
 from hwid_cli.drive.motion.linear import (
     DRIVEN,
@@ -147,7 +153,7 @@ def advance(
             trial[X], trial[V] = x, v
         if is_held or p[slots.STATIC_EXCESS] == 0.0:
             return
-        if memory[WAY] * trial[V] > STILL_FAST * p[slots.STRIBECK_VELOCITY]:
+        if memory[WAY] * trial[V] > speed_of_excess(STILL_FAST, p):
             return
     if has_inner:
         step_all(state, trial, memory, push, done, h, is_held, p)

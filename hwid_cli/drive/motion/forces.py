@@ -420,6 +420,27 @@ def sliding_friction(way: float, v: float, p: np.ndarray) -> float:
     """
     level = p[slots.FRICTION_FORWARD] if way > 0.0 else p[slots.FRICTION_BACKWARD]
     if p[slots.STATIC_EXCESS] != 0.0:
-        share = v / p[slots.STRIBECK_VELOCITY]
-        level += p[slots.STATIC_EXCESS] * np.exp(-share * share)
+        share = abs(v) / p[slots.STRIBECK_VELOCITY]
+        if p[slots.IS_STRIBECK_EXPONENTIAL] == 0.0:
+            share *= share
+        level += p[slots.STATIC_EXCESS] * np.exp(-share)
     return level
+
+
+@compiled(**INNER)
+def speed_of_excess(times: float, p: np.ndarray) -> float:
+    """Return the speed at which the excess near rest has fallen to ``exp(-times^2)``.
+
+    Parameters
+    ----------
+    times : float, [-]
+        Of the velocity in its law, where the square falls.
+    p : ndarray, shape (N_SLOTS,)
+
+    Returns
+    -------
+    float, [m/s]
+    """
+    if p[slots.IS_STRIBECK_EXPONENTIAL] != 0.0:
+        times *= times
+    return times * p[slots.STRIBECK_VELOCITY]

@@ -17,6 +17,7 @@ from hwid_cli.drive.motion.events import (
     set_inputs,
     steady_force,
 )
+from hwid_cli.drive.motion.forces import speed_of_excess
 from hwid_cli.drive.motion.hysteresis import remember
 from hwid_cli.drive.motion.linear import (
     DRIVEN,
@@ -148,7 +149,7 @@ def glide_plain(
     steady = steady_force(memory, p) - corner[2]
     slow = 0.0
     if p[slots.STATIC_EXCESS] != 0.0:
-        slow = STILL_FAST * p[slots.STRIBECK_VELOCITY]
+        slow = speed_of_excess(STILL_FAST, p)
     is_held = is_watched and way == 0.0
     done, x, v = 0.0, state[X], state[V]
     n = N_STATE + DRIVEN

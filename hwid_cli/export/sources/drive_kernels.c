@@ -133,7 +133,8 @@ enum {
     BRISTLE_EXCESS = 129,
     SENSOR_LAG_DAMPING_RATIO = 130,
     IRON = 131,
-    N_SLOTS = 132,
+    IS_STRIBECK_EXPONENTIAL = 132,
+    N_SLOTS = 133,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -1390,8 +1391,11 @@ static double drive_sliding_friction(double way, double v, double *p)
     double share = 0.0;
     level = (way > 0.0) ? p[FRICTION_FORWARD] : p[FRICTION_BACKWARD];
     if (p[STATIC_EXCESS] != 0.0) {
-        share = v / p[STRIBECK_VELOCITY];
-        level += p[STATIC_EXCESS] * exp((-share) * share);
+        share = fabs(v) / p[STRIBECK_VELOCITY];
+        if (p[IS_STRIBECK_EXPONENTIAL] == 0.0) {
+            share *= share;
+        }
+        level += p[STATIC_EXCESS] * exp(-share);
     }
     return level;
 }
@@ -1648,6 +1652,14 @@ static double drive_surplus(double net, double *p)
     int way = 0;
     way = (net > 0.0) ? FRICTION_FORWARD : FRICTION_BACKWARD;
     return fabs(net) - most(p[way] + p[STATIC_EXCESS], 0.0);
+}
+
+static double drive_speed_of_excess(double times, double *p)
+{
+    if (p[IS_STRIBECK_EXPONENTIAL] != 0.0) {
+        times *= times;
+    }
+    return times * p[STRIBECK_VELOCITY];
 }
 
 static int drive_is_anywhere(double *p)
@@ -2241,7 +2253,7 @@ static int drive_is_curved_here(double *state, double *memory, double *p)
     double gone = 0.0;
     if (p[STATIC_EXCESS] != 0.0) {
         speed = memory[WAY] * state[V];
-        if ((memory[WAY] != 0.0) && (speed < (6.1 * p[STRIBECK_VELOCITY]))) {
+        if ((memory[WAY] != 0.0) && (speed < drive_speed_of_excess(6.1, p))) {
             return 1;
         }
     }
@@ -2552,10 +2564,12 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
         pull = fabs(drive_acceleration(state, memory, push, done, p).m0);
         rate += (0.5 * pull) / slow;
     }
-    slow = p[STRIBECK_VELOCITY];
-    if ((p[STATIC_EXCESS] != 0.0) && (memory[WAY] != 0.0) && (speed < (6.1 * slow))) {
-        pull = fabs(drive_acceleration(state, memory, push, done, p).m0);
-        rate += (fabs(p[STATIC_EXCESS]) / (mass * slow)) + ((0.5 * pull) / slow);
+    if ((p[STATIC_EXCESS] != 0.0) && (memory[WAY] != 0.0)) {
+        slow = p[STRIBECK_VELOCITY];
+        if (speed < drive_speed_of_excess(6.1, p)) {
+            pull = fabs(drive_acceleration(state, memory, push, done, p).m0);
+            rate += (fabs(p[STATIC_EXCESS]) / (mass * slow)) + ((0.5 * pull) / slow);
+        }
     }
     return 0.3 / most(rate, 1e-09);
 }
@@ -3210,7 +3224,7 @@ static void drive_advance(double *state, double *trial, double *memory, double *
         if (is_held || (p[STATIC_EXCESS] == 0.0)) {
             return;
         }
-        if ((memory[WAY] * trial[V]) > (5.0 * p[STRIBECK_VELOCITY])) {
+        if ((memory[WAY] * trial[V]) > drive_speed_of_excess(5.0, p)) {
             return;
         }
     }
