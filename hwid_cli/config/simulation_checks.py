@@ -176,7 +176,9 @@ def _effect(
     for key in found:
         if key not in known:
             yield unknown_key((*place, key), known)
-    for one in known.values():
+    # Of several shapes of a law, the one that is stated says what it needs.
+    entry = entry_of(name, found)
+    for one in known.values() if entry is None else entry.stated_keys():
         if one.is_needed and one.name not in found:
             words = f"one of {', '.join(one.words)}"
             expected = words if one.words else "a finite number"
