@@ -23,6 +23,9 @@ from hwid_cli.records.recordings import Recording
 _BRIDGED = 2
 # Share of the range of a signal below which a change is rest.
 _REST = 1e-3
+# Samples whose level is that of a rest, and the standard errors by which that of their
+# halves may differ: so far a slow rise moves it by less than one sample's noise.
+_LEAST_REST, _SAME_LEVEL = 40, 2.0
 # Every third recording of a kind validates; amplitudes and speeds take turns.
 _EVERY = 3
 _SAME = 0.05
@@ -487,7 +490,7 @@ def _signals(
     return Signals(
         name=recording.name,
         kind=recording.kind,
-        driven_by=np.array(driven_by),
+        driven_by=with_level_of_rest(driven_by),
         compared=np.array(compared),
         input=np.array(recording.input),
         output=np.array(recording.output),
@@ -496,6 +499,36 @@ def _signals(
         is_held_out=recording.name in held_out,
         is_velocity=simulation.output == "velocity",
     )
+
+
+def with_level_of_rest(driven_by: np.ndarray) -> np.ndarray:
+    """Copy of an input that begins with the level at which it rests.
+
+    A drive starts in equilibrium with the first sample. The noise of that one sample would
+    move it, and where friction holds it there it stays.
+
+    Parameters
+    ----------
+    driven_by : ndarray, shape (n_samples,)
+
+    Returns
+    -------
+    ndarray, shape (n_samples,)
+        The same numbers where the input is free of noise, or moves at once.
+    """
+    found = np.array(driven_by, dtype=float)
+    n = _LEAST_REST
+    # As long as both halves have the same level, the input rests.
+    while n <= driven_by.size:
+        first, second = (float(np.mean(one)) for one in np.split(driven_by[:n], 2))
+        bends = np.diff(driven_by[:n], 4)
+        # White noise is 70 times as strong in its fourth differences.
+        noise = float(np.sqrt(np.mean(bends**2) / 70.0))
+        if noise == 0.0 or abs(second - first) > _SAME_LEVEL * 2.0 * noise / n**0.5:
+            break
+        found[0] = (first + second) / 2.0
+        n *= 2
+    return found
 
 
 def rest_length(driven_by: np.ndarray) -> int:
