@@ -158,19 +158,25 @@ def _on_input_through_runs(
     """
     criteria, base = findings.criteria, findings.base
     done = fits.values()
-    if not runs.simulator.free or any(criteria.is_complete(one) for one in done):
+    if not runs.simulator.free:
         return []
+    # Then only one that has not settled in the simulation may be as likely.
+    is_enough = any(criteria.is_complete(one) for one in done)
 
     def left(one: CandidateFit) -> float:
         # A run that leaves more than the stand-in has said has not settled.
         return float(min(one.sse.sum(), fits.get(one.effects, one).sse.sum()))
 
     # Beside what leaves hardly anything only another one that does so counts.
-    is_nearly_all = any(criteria.is_nearly_all(one, base) for one in done)
+    is_nearly_all = is_enough or any(criteria.is_nearly_all(one, base) for one in done)
     most = _NEAR * min(one.sse.sum() for one in done) if is_nearly_all else np.inf
     found: list[Turn] = []
     on_input = [
-        one for one in likely if changes_input(one.effects) and left(one) <= most
+        one
+        for one in likely
+        if changes_input(one.effects)
+        and left(one) <= most
+        and not (is_enough and one.effects in fits)
     ]
     for one in sorted(on_input, key=left)[:_MOST_ON_INPUT]:
         if runs.run_tasks.are_spent:

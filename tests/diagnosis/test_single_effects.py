@@ -38,6 +38,32 @@ def test_variants_of_one_effect_take_no_place_of_another():
     assert sorted(found) == sorted(LIKELY)
 
 
+def test_a_delay_that_did_not_settle_is_tried_beside_a_lag_that_leaves_nothing(
+    monkeypatch,
+):
+    # Turns of the stand-in ran away from the delay; the lag imitates it with two parameters.
+    tried = []
+    monkeypatch.setattr(
+        single_effects,
+        "with_input_effect",
+        lambda findings, one, runs, values: tried.append(one.effects),
+    )
+    runs = SimpleNamespace(
+        simulator=SimpleNamespace(free={"gain": None}),
+        run_tasks=SimpleNamespace(are_spent=False),
+    )
+    findings = SimpleNamespace(criteria=CRITERIA, base=base())
+    delay = made_up(("input_delay",), 100.0, whiteness=0.5)
+    lag = made_up(("actuator_lag:second_order",), 100.0, whiteness=0.5)
+    friction = made_up(("coulomb_friction",), 100.0, whiteness=0.5)
+    behind = made_up(("rate_limit",), 350.0)
+    likely = [lag, delay, friction, behind]
+    single_effects._on_input_through_runs(
+        findings, runs, {}, likely, {lag.effects: lag}
+    )
+    assert tried == [delay.effects]
+
+
 def test_kinds_of_friction_do_not_keep_a_dead_zone_from_the_simulation():
     frictions = [
         "stribeck_friction",

@@ -1,0 +1,58 @@
+"""A noisy first sample of the input moves no drive that rests."""
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis.problem import with_level_of_rest
+from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.records.drive import Drive
+
+N, STEP, NOISE = 2000, 1e-3, 0.01
+
+
+def noise_of(seed):
+    return NOISE * np.random.default_rng(seed).normal(size=N)
+
+
+def step_after(rest, height=1.0):
+    return np.where(np.arange(N) < rest, 0.2, 0.2 + height)
+
+
+def test_the_level_of_a_rest_is_its_mean():
+    errors = [
+        with_level_of_rest(step_after(400) + noise_of(seed))[0] - 0.2
+        for seed in range(400)
+    ]
+    # Of 320 samples; one in twenty ends sooner, because halves differ by chance.
+    assert np.median(np.abs(errors)) < NOISE / 15
+    assert np.quantile(np.abs(errors), 0.9) < NOISE / 4
+
+
+def test_only_the_first_sample_changes_and_none_without_noise():
+    noisy = step_after(400) + noise_of(1)
+    assert np.array_equal(with_level_of_rest(noisy)[1:], noisy[1:])
+    for clean in (step_after(400), np.sin(np.arange(N) / 50.0), np.arange(N) / N):
+        assert np.array_equal(with_level_of_rest(clean), clean)
+
+
+@pytest.mark.parametrize("slope", [1e-5, 1e-4, 1e-3, 1e-2])
+def test_a_slow_rise_is_met_better_than_by_its_first_sample(slope):
+    errors = [
+        with_level_of_rest(slope * np.arange(N) + noise_of(seed))[0]
+        for seed in range(60)
+    ]
+    assert np.sqrt(np.mean(np.square(errors))) < 1.02 * NOISE
+
+
+def test_friction_keeps_no_displacement_that_is_noise():
+    hysteresis = {"hysteresis": {"force_N": 2.0, "yield_m": 1e-4}}
+    drive = Drive(1.0, 40.0, 5000.0, 10.0, effects=hysteresis)
+    measured = step_after(1500, 0.0) + noise_of(3)
+    measured[0] = 0.2 + 3 * NOISE
+    true = 0.2 * 10.0 / 5000.0
+
+    def error(input_A):
+        found = simulate_drive(input_A, drive, sample_time_s=STEP).output
+        return abs(found[-1] - true)
+
+    assert error(with_level_of_rest(measured)) < error(measured) / 4
