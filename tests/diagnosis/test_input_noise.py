@@ -272,7 +272,7 @@ def test_a_fit_that_knows_of_the_noise_of_the_input_is_the_weighted_one():
         replace(one, input=one.input + 0.3 * np.r_[0, rng.standard_normal(N - 1)])
         for one in recordings(noise=NOISE)
     ]
-    of = problem(given)
+    of = as_recorded(problem(given))
     layout, plain, _ = at(of, fit(of))
     found = fit_with_input_noise(of, layout, plain, floor(0.3))
     weighted = fit_by_factors(of, layout, plain, 0.3)
@@ -282,6 +282,12 @@ def test_a_fit_that_knows_of_the_noise_of_the_input_is_the_weighted_one():
     )
     # It takes the size of the noise from the residuals, 2 % off.
     assert np.all(np.abs(ended - expected) < 0.1 * np.abs(started - expected))
+
+
+def as_recorded(of):
+    """A problem whose drives start under the first sample, not under a level of rest."""
+    as_read = [replace(one, driven_by=one.input) for one in of.signals]
+    return replace(of, signals=as_read)
 
 
 def fit_by_factors(of, layout, point, input_noise):

@@ -73,10 +73,10 @@ def test_under_a_controller_the_command_is_simulated():
     controller = Controller(30.0, 40.0)
     free = replace(DRIVE, stiffness_N_per_m=0.0, controller=controller)
     (first,) = recordings()[:1]
-    motion = simulate_drive(first.output, free, sample_time_s=STEP_S)
-    led = replace(
-        first, input=motion.command, output=motion.output, reference=first.output
-    )
+    # A command is free of noise: a drive rests under it exactly until it steps.
+    command = np.where(np.arange(first.input.size) < 40, 0.0, 1e-3)
+    motion = simulate_drive(command, free, sample_time_s=STEP_S)
+    led = replace(first, input=motion.command, output=motion.output, reference=command)
     (one,) = simulated([led], simulation(stiffness_N_per_m=0.0, controller=controller))
     np.testing.assert_array_equal(one.input, led.reference)
     np.testing.assert_array_equal(one.measured, led.input)
