@@ -1,6 +1,6 @@
 """Columns of Parquet and Feather (Arrow) files, by the library pyarrow."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.data.array_columns import UNIT_MARK, Variables, check_size
+from hwid_cli.data.columns import array_column
+from hwid_cli.data.long_tables import columns_of_long, long_form_of, long_tables
 
 # How the names of types begin.
 _NUMBERS = ("int", "uint", "float", "double", "half", "bool", "decimal")
 _TIMES = ("duration", "time")
+_WORDS = ("string", "large_string", "dictionary<values=string")
 _UNITS = (b"unit", b"units", b"Unit")
 
 
@@ -69,6 +72,45 @@ def _variables(rows: int, schema: Any, load: Any) -> Variables:
         unit = _unit(entry.metadata or {})
         if is_time or unit:
             found[entry.name + UNIT_MARK] = partial(np.array, "s" if is_time else unit)
+    return _of_long_table(schema, load, found) or found
+
+
+def _of_long_table(schema: Any, load: Any, numbers: Variables) -> Variables:
+    """Signals of a table whose rows name them; none where they do not."""
+    names = [entry.name for entry in schema]
+    kinds = [str(entry.type) for entry in schema]
+    form = long_form_of(
+        names, [place for place, kind in enumerate(kinds) if kind.startswith(_WORDS)]
+    )
+    if form is None or not {names[form.time], names[form.value]} <= set(numbers):
+        return {}
+
+    def words_of(places: Sequence[int], rows: np.ndarray) -> dict[int, list[str]]:
+        columns = {place: load(names[place]).to_pylist() for place in places}
+        return {
+            place: [
+                "" if cells[row] is None else str(cells[row]) for row in rows.tolist()
+            ]
+            for place, cells in columns.items()
+        }
+
+    clock = names[form.time]
+    unit = "s" if kinds[form.time].startswith(_TIMES) else ""
+    tables = long_tables(
+        clock,
+        (
+            array_column("time", numbers[clock](), unit=unit),
+            array_column("value", numbers[names[form.value]]()),
+        ),
+        words_of,
+        form,
+    )
+    found: dict[str, Any] = {}
+    for one in columns_of_long(tables):
+        name = f"{one.variable}/{one.key}" if one.variable else str(one.key)
+        found[name] = partial(np.asarray, one.values)
+        if one.unit:
+            found[name + UNIT_MARK] = partial(np.array, one.unit)
     return found
 
 

@@ -15,7 +15,7 @@ import logging
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import chain, islice, repeat
 from pathlib import Path
 from typing import TextIO
@@ -23,7 +23,7 @@ from typing import TextIO
 import numpy as np
 
 from hwid_cli.data.cells import is_stamp, is_word
-from hwid_cli.data.columns import ROLES, MeasuredColumn, keep_rows
+from hwid_cli.data.columns import ROLES, MeasuredColumn
 from hwid_cli.data.header_stamps import (
     joined_stamp,
     split_stamps,
@@ -208,11 +208,12 @@ def _long_tables(
     if form is None or (asked and all(_is_in_head(key, head) for key in asked)):
         return ()
     read = _read_body(sheet, {form.time: "time", form.value: "value"})
-    time, value = read[form.time], read[form.value]
-    n = min(time.values.size, value.values.size)
-    time, value = keep_rows(time, slice(n)), keep_rows(value, slice(n))
-    words = _words_of(sheet, (form.name, *form.others), value.rows)
-    return long_tables(head.names[form.time], time, value, words, form)
+    return long_tables(
+        head.names[form.time],
+        (read[form.time], read[form.value]),
+        partial(_words_of, sheet),
+        form,
+    )
 
 
 def _is_in_head(key: str | int, head: TableHead) -> bool:

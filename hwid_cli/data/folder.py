@@ -203,7 +203,30 @@ def guess_layout(files: Sequence[FoundFile]) -> FolderLayout:
                 return split.with_own_keys(layout)
     if not alike:
         raise MeasurementError(_no_signals(files))
-    return _layout_of_alike(alike, files)
+    layout = _layout_of_alike(alike, files)
+    if _is_named_input(layout.input):
+        return layout
+    return _with_named_command(files) or layout
+
+
+def _is_named_input(role: Role) -> bool:
+    return meaning_of(role.title, role.unit).role == "input"
+
+
+def _with_named_command(files: Sequence[FoundFile]) -> FolderLayout | None:
+    """Layout whose input, named so, stands in a file beside that of the output.
+
+    A robot writes what it is told into another file than its positions and speeds.
+    """
+    for split in split_recordings(files):
+        try:
+            layout = _layout_of_alike(split.files, split.files)
+        except MeasurementError:
+            continue
+        is_apart = split.is_marked(layout.output) and not split.is_marked(layout.input)
+        if is_apart and _is_named_input(layout.input):
+            return split.with_own_keys(layout)
+    return None
 
 
 def _layout_of_alike(

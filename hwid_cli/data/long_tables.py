@@ -6,13 +6,14 @@ Here each signal becomes a column, and each recording a table, on the stamps tha
 signals have in common. Signals that have none in common keep stamps of their own.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
 
-from hwid_cli.data.columns import ROLES, MeasuredColumn, array_column
+from hwid_cli.data.column_words import counts_recordings
+from hwid_cli.data.columns import ROLES, MeasuredColumn, array_column, keep_rows
 from hwid_cli.data.units import split_unit, unit_in_name
 from hwid_cli.errors import MissingColumnError
 from hwid_cli.files.messages import is_plain, shown
@@ -41,7 +42,8 @@ class LongForm:
     ----------
     time, name, value : int
     others : tuple of int
-        Further columns of words: each may tell recordings apart.
+        Further columns of words, and those that count recordings: each may tell these
+        apart.
     """
 
     time: int
@@ -128,30 +130,37 @@ def long_form_of(names: Sequence[str], texts: Iterable[int]) -> LongForm | None:
     name = next(named, None)
     if value is None or time is None or name is None or value in words:
         return None
-    others = tuple(place for place in words if place != name and lower[place])
+    counts = [place for place, one in enumerate(names) if counts_recordings(one)]
+    telling = sorted({*words, *counts} - {name, value, time})
+    others = tuple(place for place in telling if lower[place])
     return LongForm(time, name, value, others)
 
 
 def long_tables(
     clock: str,
-    time: MeasuredColumn,
-    value: MeasuredColumn,
-    words: Mapping[int, Sequence[str]],
+    numbers: tuple[MeasuredColumn, MeasuredColumn],
+    words_of: Callable[[Sequence[int], np.ndarray], Mapping[int, Sequence[str]]],
     form: LongForm,
 ) -> tuple[LongTable, ...]:
     """Tables that a long one holds.
 
     Parameters
     ----------
-    time, value : MeasuredColumn, n rows
-    words : mapping of int to sequence of str
-        Cells of the columns of words, n rows each.
+    clock : str
+        Name of the column of times.
+    numbers : tuple of two MeasuredColumn
+        Times and values; the rows that one of them lacks at its end are left out.
+    words_of : callable
+        Cells of columns of words in some rows of the file, by column.
 
     Returns
     -------
     tuple of LongTable
         In the order in which they begin; empty where there are no two signals.
     """
+    n = min(one.values.size for one in numbers)
+    time, value = (keep_rows(one, slice(n)) for one in numbers)
+    words = words_of((form.name, *form.others), value.rows)
     names = np.asarray(words[form.name])
     known = np.isfinite(time.values) & np.isfinite(value.values)
     if not _FEWEST_NAMES <= np.unique(names[known]).size <= _MOST_NAMES:

@@ -1,18 +1,30 @@
 """Columns of a spreadsheet: XLSX, XLS and ODS, by the library calamine.
 
 A sheet is a table like a text file: names, units and settings may stand above the
-numbers. Of several sheets ``recordings.columns.variable`` names one.
+numbers. Of several sheets ``recordings.columns.variable`` names one. A sheet may hold a
+long table, too: its recordings stand behind the sheet's name where there are several.
 """
 
 import datetime as dt
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from hwid_cli.data.array_columns import check_size
 from hwid_cli.data.cells import is_stamp
 from hwid_cli.data.columns import ROLES, MeasuredColumn
+from hwid_cli.data.long_tables import (
+    LongTable,
+    columns_of_long,
+    long_form_of,
+    long_tables,
+    pick_from_long,
+)
 from hwid_cli.data.table_columns import (
     ColumnParts,
     column_named,
@@ -48,6 +60,9 @@ def read_sheet_columns(
         role: key for role in roles if (key := getattr(columns, role)) is not None
     }
     texts = [key for key in wanted.values() if isinstance(key, str)]
+    if tables := _asked_long_tables(path, columns.variable, texts):
+        yield from pick_from_long(str(path), columns, tables, roles)
+        return
     name, rows = _sheet_of(path, columns.variable)
     head = read_head(_as_texts(rows[:_HEAD_ROWS]), wanted=texts)
     if head.body == min(len(rows), _HEAD_ROWS):
@@ -77,13 +92,74 @@ def read_sheet_columns(
 def list_sheet_columns(path: Path) -> Iterator[FoundColumn]:
     """List the columns of numbers of every sheet; of one sheet alone without its name."""
     found = {}
-    for name, rows in _tables(path).items():
+    sheets = _tables(path)
+    if tables := _long_tables(path, sheets, is_named=len(sheets) > 1):
+        yield from columns_of_long(tables)
+        sheets = {}
+    for name, rows in sheets.items():
         head = read_head(_as_texts(rows[:_HEAD_ROWS]))
         places = [one for one in range(max(map(len, rows))) if one not in head.texts]
         titles = {place: f"column {place}" for place in places}
         found[name] = (_read_body(path, rows, head, titles), head)
     for name, (read, head) in found.items():
         yield from found_columns(read, head, variable=name if len(found) > 1 else None)
+
+
+def _asked_long_tables(
+    path: Path, name: str | None, wanted: Sequence[str]
+) -> tuple[LongTable, ...]:
+    """Long tables of the sheet that is asked for, else of all; none in a wide sheet."""
+    if name is not None and name in _names(path):
+        return _long_tables(path, {name: _rows(path, name)}, wanted, is_named=True)
+    sheets = _tables(path)
+    return _long_tables(path, sheets, wanted, is_named=len(sheets) > 1)
+
+
+def _long_tables(
+    path: Path,
+    sheets: Mapping[str, list[list[Any]]],
+    wanted: Sequence[str] = (),
+    *,
+    is_named: bool,
+) -> tuple[LongTable, ...]:
+    """Tables of sheets whose rows name their signals; none where they do not.
+
+    Parameters
+    ----------
+    wanted : sequence of str
+        Columns that are asked for: where the head names them all, they are meant.
+    is_named : bool
+        Whether the name of a sheet stands in front of those of its recordings.
+    """
+    found = []
+    for sheet, rows in sheets.items():
+        head = read_head(_as_texts(rows[:_HEAD_ROWS])) if rows else None
+        form = None if head is None else long_form_of(head.names, head.texts)
+        is_wide = bool(wanted) and head is not None and set(wanted) <= set(head.names)
+        if head is None or form is None or is_wide:
+            continue
+        read = _read_body(path, rows, head, {form.time: "time", form.value: "value"})
+        tables = long_tables(
+            head.names[form.time],
+            (read[form.time], read[form.value]),
+            partial(_words_of, rows),
+            form,
+        )
+        for one in tables:
+            parts = (sheet if is_named else "", one.name)
+            found.append(replace(one, name="/".join(part for part in parts if part)))
+    return tuple(found)
+
+
+def _words_of(
+    rows: Sequence[Sequence[Any]], places: Sequence[int], lines: np.ndarray
+) -> dict[int, list[str]]:
+    """Cells of columns of words in some rows, which count from 1, by column."""
+    cells = [rows[line - 1] for line in lines.tolist()]
+    return {
+        place: [_as_text(row[place]) if place < len(row) else "" for row in cells]
+        for place in places
+    }
 
 
 def _read_body(
@@ -179,6 +255,13 @@ def _cell(cell: Any) -> float | str:
     if isinstance(cell, dt.timedelta):
         return cell.total_seconds()
     return str(cell).strip()
+
+
+def _as_text(cell: Any) -> str:
+    """Text of a cell; a sheet has no whole numbers, which count recordings."""
+    return (
+        str(int(cell)) if isinstance(cell, float) and cell.is_integer() else str(cell)
+    )
 
 
 def _as_texts(rows: Sequence[Sequence[Any]]) -> list[list[str]]:

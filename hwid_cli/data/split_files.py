@@ -7,6 +7,7 @@ marked.
 """
 
 import glob
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,10 +17,13 @@ from pathlib import PurePosixPath
 from hwid_cli.data.column_clocks import long_columns
 from hwid_cli.data.column_signs import clock_of
 from hwid_cli.data.column_words import meaning_of
+from hwid_cli.data.units import split_unit
 from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
 
 # In front of the keys of the second file: no column is called so.
 _MARK = "\u21e2"
+# What programs call the only signal of a file, whatever it is.
+_ANY_SIGNAL = frozenset(("data", "value", "values", "val", "wert", "signal", "reading"))
 # Files whose names are compared.
 _MOST_FILES = 200
 
@@ -167,6 +171,9 @@ def _joined(
 
 
 def _titled(column: FoundColumn, name: str) -> FoundColumn:
-    """A column with a name: a signal that has none gets that of its file."""
-    is_named = bool(column.title) or clock_of(column.values) is not None
+    """A column with a name: a signal that has none of its own gets that of its file."""
+    if clock_of(column.values) is not None:
+        return column
+    last = re.split(r"[./]", split_unit(column.title)[0])[-1].strip().lower()
+    is_named = bool(column.title) and last not in _ANY_SIGNAL
     return column if is_named else replace(column, title=name)

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from hwid_cli.config.load import load_experiment
+from hwid_cli.data.folder import guess_layout, list_measurements
 from hwid_cli.data.recordings import check_unchanged, read_recordings
 from hwid_cli.data.split_files import split_recordings
 from hwid_cli.errors import ConfigError, MeasurementError
@@ -96,3 +98,40 @@ def test_names_tell_which_files_belong_together(names, change):
 
 def test_names_that_differ_in_folder_and_file_do_not():
     assert not list(split_recordings(found(("a/u.csv", "b/y.csv"))))
+
+
+def topics(folder, states):
+    """What is told to a joint in one file of each run, its states in another one."""
+    rng = np.random.default_rng(4)
+    t = 0.005 * np.arange(400)
+    for run in (1, 2, 3):
+        command = np.repeat(rng.uniform(-2, 2, 20), 20)
+        speed = lfilter([0.1], [1, -0.9], command)
+        columns = {"position": 0.005 * np.cumsum(speed), "velocity": speed}
+        told = {"time": t, ".data": command}
+        told_of = {"time": t + 0.001} | {f".{one}": columns[one] for one in states}
+        for name, table in (("joint1_command", told), ("joint_states", told_of)):
+            path = folder / f"bag{run}" / f"{name}.csv"
+            path.parent.mkdir(exist_ok=True)
+            np.savetxt(
+                path, np.column_stack(list(table.values())),
+                delimiter=",", header=",".join(table), comments="",
+            )  # fmt: skip
+
+
+@pytest.mark.parametrize("states", [("position", "velocity"), ("velocity",)])
+def test_a_command_in_a_file_of_its_own_is_the_input_of_a_joint(tmp_path, states):
+    topics(tmp_path, states)
+    layout = guess_layout(list_measurements(tmp_path))
+
+    assert (layout.input.key, layout.output.key) == (".data", f".{states[0]}")
+    assert layout.output_file == ("joint1_command", "joint_states")
+
+
+def test_a_file_that_names_its_own_input_needs_no_other_one(tmp_path):
+    topics(tmp_path, ("position", "velocity"))
+    for path in tmp_path.glob("*/joint_states.csv"):
+        path.write_text(path.read_text().replace(".velocity", ".current"))
+    layout = guess_layout(list_measurements(tmp_path))
+
+    assert (layout.input.key, layout.output_file) == (".current", None)
