@@ -28,6 +28,10 @@ _LEAST_REPEATED, _MOST_REPEATED = 2e-3, 0.25
 _BY_CHANCE = 2.0
 _LEAST_CHANCE = 1e-3
 _STOPPED = 3.0
+# A signal is in motion where it moves by so many times its noise; a lost sample is made up
+# for by a move so many times the one before; fewer than so many may be anything.
+_IN_MOTION, _MADE_UP, _FEWEST_LOST = 6.0, 1.5, 3
+_SHORTEST = 8
 # Damaged samples are rarer than this share.
 _MOST_DAMAGED = 0.01
 # Correlations of neighbours, and of the next but one, that interpolation makes at most.
@@ -71,6 +75,14 @@ def _without_repeats(signals: Signals) -> Signals:
     replaced by the middle of its neighbours, a repeated output is not evaluated.
     """
     output, inputs = _repeats(signals.compared), _repeats(signals.driven_by)
+    lost = _lost_in_motion(signals.compared)
+    if lost.any():
+        # A lost message repeats both; where the output rests, nothing else shows it.
+        both = _single_repeats(signals.compared)
+        both[1:-1] &= np.diff(signals.driven_by[:-1]) == 0
+        is_message = np.count_nonzero(both & lost) > 0.5 * np.count_nonzero(lost)
+        inputs = inputs | both if is_message else inputs
+        output = output | lost
     driven_by = signals.driven_by
     if inputs.any():
         driven_by = driven_by.copy()
@@ -81,14 +93,43 @@ def _without_repeats(signals: Signals) -> Signals:
     return signals.repaired(driven_by).only(~output)
 
 
+def _single_repeats(values: np.ndarray) -> np.ndarray:
+    """Samples that repeat the one before, which is no repeat, as the next one is none."""
+    found = np.zeros(values.size, dtype=bool)
+    same = np.diff(values) == 0
+    found[2:-1] = same[1:-1] & ~same[:-2] & ~same[2:]
+    return found
+
+
+def _lost_in_motion(values: np.ndarray) -> np.ndarray:
+    """Single repeats of a signal that moves, and makes up for them with the next sample.
+
+    Where it moves by much more than its noise and its steps, none happens by chance.
+    """
+    found = np.zeros(values.size, dtype=bool)
+    if values.size < _SHORTEST:
+        return found
+    moves = np.diff(values)
+    steps = np.abs(moves[moves != 0])
+    # Of white noise fourth differences are 70 times the variance, moves twice.
+    noise = np.median(np.abs(np.diff(values, 4))) / (0.6745 * 70**0.5)
+    least = max(_IN_MOTION * 2**0.5 * noise, 3.0 * np.min(steps, initial=np.inf))
+    at = np.flatnonzero(_single_repeats(values))
+    before, after = moves[at - 2], moves[at]
+    is_lost = (np.abs(before) > least) & (after / before > _MADE_UP)
+    n_moving = int(np.count_nonzero(np.abs(moves) > least))
+    if _FEWEST_LOST <= np.count_nonzero(is_lost) <= _MOST_REPEATED * n_moving:
+        found[at[is_lost]] = True
+    return found
+
+
 def _repeats(values: np.ndarray) -> np.ndarray:
     """Which samples are single repeats, if there are some but not many."""
     found = np.zeros(values.size, dtype=bool)
-    if values.size < 4:
+    if values.size < _SHORTEST:
         return found
     same = np.diff(values) == 0
-    # Sample n repeats n-1, while n-1 differs from n-2 and n+1 from n.
-    single = same[1:-1] & ~same[:-2] & ~same[2:]
+    single = _single_repeats(values)[2:-1]
     share = np.count_nonzero(single) / values.size
     moving = np.count_nonzero(~same) / values.size
     if (

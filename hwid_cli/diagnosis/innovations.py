@@ -1,6 +1,7 @@
 """What the samples before do not tell of a residual, and the filter that finds it."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -21,6 +22,21 @@ class Innovations:
 
     values: np.ndarray
     log_variances: float
+
+
+class Whitening(Protocol):
+    """From a residual to its innovations."""
+
+    def __call__(self, residual: np.ndarray) -> Innovations:
+        """Innovations of a residual, shape (n_samples,)."""
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """What tells it from another one, shape (n,)."""
+
+    @property
+    def elsewhere(self) -> "StationaryFilter":
+        """The one that comes nearest to it along other motions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +68,16 @@ class StationaryFilter:
         found = answer(self.change, self.gain, -self.reading, 1.0, given)
         logs = residual.size * float(np.log(self.variance))
         return Innovations(found / np.sqrt(self.variance), logs)
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """What tells it from another one, shape (n,)."""
+        return np.r_[self.change.ravel(), self.gain]
+
+    @property
+    def elsewhere(self) -> "StationaryFilter":
+        """The one that comes nearest to it along other motions: itself."""
+        return self
 
 
 @compiled()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from hwid_cli.diagnosis.innovations import Innovations
+from hwid_cli.diagnosis.innovations import Innovations, Whitening
 from hwid_cli.diagnosis.noise import input_levels, noise_levels, quiet_input_rms
 from hwid_cli.diagnosis.parameters import (
     ParameterLayout,
@@ -23,7 +23,7 @@ from hwid_cli.diagnosis.parameters import (
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.search import within_bounds
 from hwid_cli.diagnosis.whiteness import WHITE_BY_TWO_ROUTES, portmanteau
-from hwid_cli.diagnosis.whitening_filters import Whitening, noisy_drives
+from hwid_cli.diagnosis.whitening_filters import noisy_drives
 from hwid_cli.records.diagnosis import LEAST_SURE, SMALL_REMAINDER, NoiseFloor
 from hwid_cli.records.drive import Drive
 

@@ -333,7 +333,8 @@ def played(
     like = min(problem.signals, key=lambda one: one.sample_time_s)
     signals = Signals(
         "next", "other", command, nothing, command, nothing, step,
-        is_velocity=is_velocity, noise_filter=like.noise_filter,
+        is_velocity=is_velocity,
+        noise_filter=None if like.noise_filter is None else like.noise_filter.elsewhere,
     )  # fmt: skip
     one = replace(problem, signals=(signals,))
     point = _single(candidate.point)

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.diagnosis.candidate import rebuilt
-from hwid_cli.diagnosis.innovations import StationaryFilter
 from hwid_cli.diagnosis.input_noise import LESS_NOISE, told_input_rms
 from hwid_cli.diagnosis.noise import noise_levels
 from hwid_cli.diagnosis.parameters import drives_at, residuals_at
@@ -45,7 +44,9 @@ def with_noise_filter(
     has_one_size = not noise.is_coloured and np.ptp(noise_levels(problem, noise)) == 0
     if noise.input_rms <= 0 or noise.rms <= 0 or not has_one_size:
         return None
-    drives = noisy_drives([drive] * len(problem.signals), problem.signals)
+    drives = noisy_drives(
+        [drive] * len(problem.signals), problem.signals, are_whole=True
+    )
     pairs = list(zip(drives, problem.signals, strict=True))
     moved = [one.moved(signals.n_evaluated)[0] for one, signals in pairs]
     if noise.input_rms * np.sqrt(np.median(moved)) < _HIDES * noise.rms:
@@ -54,7 +55,7 @@ def with_noise_filter(
     signals = tuple(
         replace(one, noise_filter=found)
         for one, found in zip(problem.signals, filters, strict=True)
-        if isinstance(found, StationaryFilter)
+        if found is not None
     )
     is_whole = len(signals) == len(problem.signals)
     return replace(problem, signals=signals) if is_whole else None
@@ -113,9 +114,7 @@ class FilteredTasks:
     def __call__(self, tasks: Sequence[DiagnosisTask], *, keep: bool) -> list[Any]:
         """Results in the order of the tasks."""
         filters = [one.noise_filter for one in self.problem.signals]
-        arrays = [
-            np.r_[one.change.ravel(), one.gain] for one in filters if one is not None
-        ]
+        arrays = [one.numbers for one in filters if one is not None]
         marked = [
             replace(
                 one,

@@ -41,6 +41,8 @@ LOST_TO_NOISE = 0.3
 # 0.9 and more, machines that other forces act on 0.3 at most.
 IMITATION_LEAVES = 0.5
 IMITATION_DAMPING = 30.0
+# Pieces whose base leaves so many times what that of whole recordings leaves start wrong.
+WRONG_START = 10.0
 
 
 def imitates(rounds: Rounds) -> bool:
@@ -75,7 +77,7 @@ def seeds_of_pieces(
         Near ones that include a best set.
     """
     of_pieces = _rounds_of(rounds, in_pieces(rounds.problem, force))
-    if not of_pieces.base.is_usable:
+    if not of_pieces.base.is_usable or _start_wrong(rounds, of_pieces):
         return (), (), ()
     free = in_pieces(rounds.problem, force, are_free=True)
     criteria = SelectionCriteria.of(free, rounds.baseline.noise)
@@ -99,6 +101,16 @@ def seeds_of_pieces(
     wide = [one for one in others if includes_one_of(one.effects, chosen)]
     near = [one for one in others if one not in wide]
     return tuple(found.best), tuple(near), tuple(wide)
+
+
+def _start_wrong(rounds: Rounds, of_pieces: Rounds) -> bool:
+    """Whether pieces begin elsewhere than the machine was, so that no effect fits them.
+
+    The base has less to follow in a piece than in a whole recording, and leaves less of
+    it. A lost sample where a piece begins gives that another speed.
+    """
+    left = of_pieces.criteria.ratio(of_pieces.base)
+    return left > WRONG_START * rounds.criteria.ratio(rounds.base)
 
 
 def _from_there(

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 import scipy
 
-from hwid_cli.diagnosis.innovations import StationaryFilter
+from hwid_cli.diagnosis.innovations import Whitening
 from hwid_cli.drive.simulation import NO_FORCE, refined
 from hwid_cli.records.axis import base_of, name_inside
 from hwid_cli.records.drive import LINE, SOURCES, UNSAID_HOLD, WINDING, Drive
@@ -88,7 +88,7 @@ class Signals:
     pushes : ndarray, shape (n_samples, n_free) or (0, 0), [N]
         Forces that move such a drive as parameters of that simulation do, each by about
         the noise; what is fitted beside them is as uncertain as they leave it.
-    noise_filter : StationaryFilter or None
+    noise_filter : Whitening or None
         Takes out of what a simulation leaves what noise of the input has done.
     """
 
@@ -108,7 +108,7 @@ class Signals:
     offset: np.ndarray | None = None
     own_start: tuple[float, float] | None = None
     pushes: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
-    noise_filter: StationaryFilter | None = None
+    noise_filter: Whitening | None = None
 
     @cached_property
     def position(self) -> np.ndarray:

@@ -4,7 +4,7 @@ A straight spring has one stationary filter; a curved one is another spring at e
 and its filter follows the motion. docs/method_diagnosis.md, eq. (D27), (D27a).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -13,7 +13,12 @@ import numpy as np
 import scipy
 
 from hwid_cli.compiled import INNER, compiled
-from hwid_cli.diagnosis.innovations import Innovations, StationaryFilter, answer
+from hwid_cli.diagnosis.innovations import (
+    Innovations,
+    StationaryFilter,
+    Whitening,
+    answer,
+)
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.drive.linear import has_inner_states, linear_equations
 from hwid_cli.drive.springs import stiffness_at
@@ -27,7 +32,6 @@ _N_SPRINGS = 32
 
 # a, b and through of several springs.
 _Tables = tuple[np.ndarray, np.ndarray, np.ndarray]
-Whitening = Callable[[np.ndarray], Innovations]
 
 
 class NoisyDrive(Protocol):
@@ -139,22 +143,60 @@ class CurvedDrive:
 
     def whitening(self, strength: float) -> Whitening | None:
         """From a residual to its innovations; None without a filter."""
-        first = self.mean.covariance(strength)
-        if first is None:
+        first, mean = self.mean.covariance(strength), self.mean.whitening(strength)
+        if first is None or mean is None:
             return None
-        reading, tables = int(np.argmax(self.mean.c[0])), self._tables
-
-        def innovations(residual: np.ndarray) -> Innovations:
-            values, logs = _along(residual, self.at, tables, reading, strength, first)
-            return Innovations(values, float(logs))
-
-        return innovations
+        reading = int(np.argmax(self.mean.c[0]))
+        return CurvedFilter(self.at, self._tables, reading, strength, first, mean)
 
     def moved(self, size: int) -> tuple[float, float]:
         """Mean square of the reading that noise of variance 1 makes from rest."""
         reading = int(np.argmax(self.mean.c[0]))
         _, draws = self.mean.moved(size)
         return float(_spread(self.at[:size], self._tables, reading)), draws
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedFilter:
+    """From a residual to its innovations, along the motion of a curved spring.
+
+    Parameters
+    ----------
+    at : ndarray, shape (n_samples,)
+        Where between the springs of ``tables`` the spring is after each sample.
+    tables : tuple of three ndarray
+        As ``CurvedDrive`` has them.
+    reading : int
+        State that is read.
+    strength : float
+        Variance of the input's noise in units of the output's.
+    covariance : ndarray, shape (2, 2)
+        Of the state before the first sample.
+    elsewhere : StationaryFilter
+        With the mean of the springs, for other motions.
+    """
+
+    at: np.ndarray
+    tables: _Tables
+    reading: int
+    strength: float
+    covariance: np.ndarray
+    elsewhere: StationaryFilter
+
+    def __call__(self, residual: np.ndarray) -> Innovations:
+        """Innovations of a residual, shape (n_samples,)."""
+        values, logs = _along(
+            np.ascontiguousarray(residual, dtype=np.float64), self.at, self.tables,
+            self.reading, self.strength, self.covariance,
+        )  # fmt: skip
+        return Innovations(values, float(logs))
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """What tells it from another one, shape (n,)."""
+        a, b, through = self.tables
+        of_motion = (self.at, a.ravel(), b.ravel(), through)
+        return np.r_[np.concatenate(of_motion), self.strength, self.elsewhere.numbers]
 
 
 @compiled()
@@ -238,7 +280,7 @@ def _carried(
 
 
 def noisy_drives(
-    drives: Sequence[Drive], signals: Sequence[Signals]
+    drives: Sequence[Drive], signals: Sequence[Signals], *, are_whole: bool = False
 ) -> list[NoisyDrive]:
     """What noise of the input moves, for each recording.
 
@@ -246,11 +288,14 @@ def noisy_drives(
     ----------
     drives : sequence of Drive
         Of each recording, with the fitted base.
+    are_whole : bool
+        Whether they go along all samples, not only those that are evaluated.
     """
     straight: dict[tuple[int, float, float], StraightDrive] = {}
     found: list[NoisyDrive] = []
     for drive, one in zip(drives, signals, strict=True):
-        stiffness = stiffness_at(drive, one.position[one.evaluated])
+        position = one.position if are_whole else one.position[one.evaluated]
+        stiffness = stiffness_at(drive, position)
         mean = float(np.mean(stiffness))
         is_curved = np.ptp(stiffness) > _ONE_SPRING * abs(mean)
         if is_curved and not has_inner_states(drive):

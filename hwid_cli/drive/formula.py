@@ -352,6 +352,36 @@ def edges(node: Node) -> tuple[bool, bool]:
     return any(one in _JUMPING for one in at), bool(at)
 
 
+def jumps_along(node: Node) -> Node | None:
+    """A formula whose value changes wherever a force jumps along the way.
+
+    Each sign counts three times as much as the one before, so that no two sets of them
+    have the same sum.
+
+    Parameters
+    ----------
+    node : Node
+        Without parameters.
+
+    Returns
+    -------
+    Node or None
+        None where nothing jumps, or something does with other variables than the position.
+    """
+    jumping = [
+        one for one in node.walk() if one.name in _JUMPING and not names(one) <= {"v"}
+    ]
+    if not jumping or any(names(one) != {"x"} for one in jumping):
+        return None
+    counted = {one.parts[0]: Node("sign", parts=one.parts) for one in jumping}
+    return sum_of(
+        [
+            Node("*", parts=(Node(value=3.0**number), one))
+            for number, one in enumerate(counted.values())
+        ]
+    )
+
+
 def waves(node: Node, variable: str) -> float:
     """Fastest turn of a sine or cosine by a variable.
 

@@ -233,6 +233,10 @@ def with_formulas(
     if not effects:
         return vector
     of = _by_place(effects)
+    force = of.get(slots.OWN_FORCE)
+    sides = None if force is None else text.jumps_along(force)
+    if sides is not None:
+        of[slots.OWN_JUMPS] = sides
     depth = max(text.depth(one) for one in of.values())
     vector[slots.OWN_PILE] = vector.size
     parts, end = [vector, np.zeros(depth + 1)], vector.size + depth + 1
@@ -241,7 +245,6 @@ def with_formulas(
         steps = np.array(text.program(node))
         parts.append(steps)
         end += steps.size
-    force = of.get(slots.OWN_FORCE)
     if force is not None:
         jumps, bends = text.edges(force)
         vector[slots.OWN_FRICTION] = float(text.has_friction(force))
@@ -252,7 +255,7 @@ def with_formulas(
     return np.concatenate(parts)
 
 
-# Steps in a sample where a force jumps at places that are not located.
+# Steps in a sample in which a force may jump: its places are not located.
 _JUMP_STEPS = 8.0
 
 

@@ -130,6 +130,7 @@ that is switched off is 0, except where the comment says infinite.
     OWN_WAVES,  # fastest turn of the force along the way, [rad/m]
     OWN_TURNING,  # and in time, [rad/s]
     OWN_FINENESS,  # steps in a sample, at least
+    OWN_JUMPS,  # where the formula begins that tells the sides of jumps; 0: anywhere
     OWN_BENDS,  # set: the force has corners
     SAMPLE_TIME,  # set by the simulation
     LAG_DAMPING_RATIO,
@@ -142,4 +143,4 @@ that is switched off is 0, except where the comment says infinite.
     IRON,  # how far iron is driven at the reference current
     IS_STRIBECK_EXPONENTIAL,  # 1 where the excess falls as exp(-|v| / vs)
     N_SLOTS,
-) = range(134)
+) = range(135)

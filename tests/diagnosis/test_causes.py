@@ -176,3 +176,58 @@ def test_under_a_controller_damage_is_in_the_command_and_counts():
     given = replace(given, input=current, reference=given.output)
     of = problem([given], controller=Controller(20.0, 30.0))
     assert without_damage(of) is of
+
+
+def messages(seed, n=4000):
+    """Moves with long rests between, of a noisy encoder whose steps are half its noise.
+
+    At rest a third of the readings repeat the one before.
+    """
+    rng = np.random.default_rng(seed)
+    t = np.arange(n)
+    moves = np.where((t // 500) % 2 == 1, np.sin(np.pi * (t % 500) / 500), 0.0)
+    position = 2e-4 * np.cumsum(moves)
+    reading = 1e-6 * np.round((position + 1e-6 * rng.standard_normal(n)) / 1e-6)
+    current = 1e-3 * np.round((moves + 4e-3 * rng.standard_normal(n)) / 1e-3)
+    lost = np.sort(rng.choice(np.arange(10, n - 10, 3), 24, replace=False))
+    return current, reading, lost
+
+
+def of_messages(current, reading):
+    given = recordings()[0]
+    return problem([replace(given, input=current, output=reading)])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_messages_that_a_bus_has_lost_are_found_by_the_motion(seed):
+    current, reading, lost = messages(seed)
+    of = of_messages(repeated(current, lost), repeated(reading, lost))
+    (found,) = without_repeats(of).signals
+    unused = np.setdiff1d(np.arange(reading.size), found.evaluated)
+    moving = lost[np.abs(reading[lost + 1] - reading[lost - 1]) > 4e-5]
+
+    assert moving.size >= 5
+    assert set(moving) <= set(unused) <= set(lost)
+    # Where it moves, a current that was lost with the message is a straight line.
+    middle = 0.5 * (current[moving - 1] + current[moving + 1])
+    np.testing.assert_allclose(found.driven_by[moving], middle, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_bus_that_loses_nothing_is_taken_as_it_is(seed):
+    current, reading, _ = messages(seed)
+    of = of_messages(current, reading)
+    assert without_repeats(of).signals == of.signals
+
+
+def test_a_machine_that_sticks_for_a_sample_has_lost_none():
+    """It does not make up for what it has not moved."""
+    n = 3000
+    speed = 1e-4 * (1.2 + np.sin(np.arange(n) / 200))
+    speed[np.arange(100, n - 100, 150)] = 0.0
+    reading = np.cumsum(speed) + 1e-6 * np.sin(np.arange(n) ** 2)
+    for row in np.arange(100, n - 100, 150):
+        reading[row] = reading[row - 1]
+    of = of_messages(np.sin(np.arange(n) / 200.0), reading)
+    (found,) = without_repeats(of).signals
+    assert found.n_evaluated == n

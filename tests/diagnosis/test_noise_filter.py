@@ -77,6 +77,74 @@ def test_behind_the_filter_noise_of_both_is_white_and_as_large_as_that_of_the_ou
     assert abs(lagged) < 4 / np.sqrt(n)
 
 
+MAGNETS = {
+    "cogging": {
+        "amplitude_N": 30.0,
+        "period_m": 0.02,
+        "phase_rad": 0.4,
+        "zero_at": "mean",
+    }
+}
+
+
+def over_magnets(seed, input_rms, rms):
+    """What noise of the input changes of a slow motion over magnets, by plain small steps.
+
+    Between two magnets it is pushed back, on top of one away: twice a period the axis is
+    now a stiff spring, now none.
+    """
+    rng = np.random.default_rng(seed)
+    n, step, fine = 3000, 1e-3, 20
+    drive = replace(FREE, mass_kg=2.0, damping_N_s_per_m=60.0, effects=MAGNETS)
+    noise = input_rms * rng.standard_normal(n)
+    command = 9.0 * np.sin(2 * np.pi * 0.7 * step * np.arange(n))
+    ends = []
+    for u in (command, command + noise):
+        x = v = 0.0
+        places = np.zeros(n)
+        for k in range(n):
+            places[k] = x
+            following = u[min(k + 1, n - 1)]
+            for j in range(fine):
+                pushed = 5.0 * (u[k] + (j + 0.5) / fine * (following - u[k]))
+                pushed += 30.0 * np.sin(2 * np.pi * x / 0.02 + 0.4) - 60.0 * v
+                v += step / fine * pushed / 2.0
+                x += step / fine * v
+        ends.append(places)
+    left = ends[1] - ends[0] + rms * rng.standard_normal(n)
+    return drive, Signals("r", "", command, ends[0], command, ends[0], step), left
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_filter_follows_magnets_that_the_simulation_has(seed):
+    noise = floor(0.1)
+    drive, signals, left = over_magnets(seed, noise.input_rms, noise.rms)
+    linked = {}
+    for name, of in (("followed", drive), ("straight", replace(drive, effects={}))):
+        found = with_noise_filter(
+            replace(problem(), signals=(signals,), drive=of), of, noise
+        )
+        free = found.signals[0].noise_filter(left).values
+        linked[name] = abs(free[1:] @ free[:-1]) / (free @ free)
+        if of is drive:
+            assert np.std(free) == pytest.approx(noise.rms, rel=0.04)
+
+    assert np.std(left) > 4 * noise.rms
+    assert linked["followed"] < 2 / np.sqrt(left.size) < 0.1 < linked["straight"]
+
+
+def test_a_filter_along_a_motion_leaves_other_motions_to_its_mean():
+    noise = floor(0.1)
+    drive, signals, left = over_magnets(1, noise.input_rms, noise.rms)
+    of = replace(problem(), signals=(signals,), drive=drive)
+    found = with_noise_filter(of, drive, noise).signals[0].noise_filter
+    shorter = found.elsewhere(left[:700]).values
+
+    assert shorter.size == 700
+    assert np.isfinite(shorter).all()
+    assert found.numbers.size > left.size
+
+
 @pytest.fixture(scope="module")
 def drifted():
     """Signals of a free axis whose simulation is off by what noise has added up to."""

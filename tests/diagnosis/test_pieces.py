@@ -1,5 +1,7 @@
 """Pieces that judge: a linear motor whose whole recordings no simulation can follow."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,11 @@ from hwid_cli.diagnosis.base_fit import compared_as_given
 from hwid_cli.diagnosis.latent_force import latent_force
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.pieces import in_pieces
+from hwid_cli.diagnosis.pieces_search import seeds_of_pieces
 from hwid_cli.diagnosis.problem import prepare
+from tests.diagnosis.small_drive import in_turn
+from tests.diagnosis.small_rounds import FEW, rounds_of
+from tests.stages.diagnosed_drive import FRICTION
 
 STEP_S, NOISE = 2e-3, 2e-5
 MASS, DAMPING, CONSTANT = 4.0, 8.0, 25.0
@@ -153,3 +159,24 @@ def test_pieces_of_a_recording_whose_zero_is_free_count_from_the_same_zero():
     for whole in (given, compared_as_given(pieces)):
         left = np.concatenate([one.residual for one in whole])
         assert np.sqrt(np.mean(left**2)) < 5.0 * NOISE
+
+
+@pytest.mark.parametrize("error", [pytest.param(0.0, marks=pytest.mark.thorough), 0.5])
+def test_pieces_that_start_at_another_speed_are_not_searched(error):
+    """A lost sample where a piece begins doubles the speed that is read there."""
+    rounds = rounds_of(FRICTION, FEW)
+    given = compared_as_given(rounds.problem)
+    smoothed = [
+        replace(one, velocity=one.velocity + error)
+        for one in latent_force(
+            given, rounds.problem.drive, noise_floor(rounds.problem)
+        )
+    ]
+    asked = []
+
+    def run_tasks(tasks, *, keep):
+        asked.extend(one.name for one in tasks)
+        return in_turn(tasks, keep=keep)
+
+    seeds, *_ = seeds_of_pieces(replace(rounds, run_tasks=run_tasks), smoothed, 1)
+    assert bool(asked) is bool(seeds) is (error == 0.0)

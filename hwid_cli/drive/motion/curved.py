@@ -7,6 +7,7 @@ import numpy as np
 
 from hwid_cli.compiled import INNER, MAKING, compiled
 from hwid_cli.drive import slots
+from hwid_cli.drive.interpreter import formula_value
 from hwid_cli.drive.motion.forces import (
     acceleration,
     drive_now,
@@ -50,6 +51,8 @@ FAST, FAR = 6.1, 37.0
 OWN_SHARE, OWN_RATE = 1e-4, 30.0
 # Samples that a bend of such a force is seen ahead: as many as steps go on without a look.
 OWN_AHEAD = 6.0
+# Places on each side at which it is asked whether such a force has jumped.
+JUMP_POINTS = 2
 # Depth of a contact that is only ahead, [m].
 JUST_IN = 1e-300
 # A step within which drag settles so often is taken implicitly: Runge-Kutta steps explode
@@ -266,10 +269,29 @@ def _rate_of_own(
     damping = (own_force(x, v + dv, way, push, done, p) - here) / dv
     rate = np.sqrt(stiffness / mass) + abs(damping) / mass
     rate += 0.12 * p[slots.OWN_WAVES] * abs(v) + 0.12 * p[slots.OWN_TURNING]
-    if p[slots.OWN_FINENESS] > 0.0:
+    if p[slots.OWN_FINENESS] > 0.0 and _may_jump(state, memory, push, done, p):
         # The shortest time that is known here is a share of a sample.
         rate += LONGEST_PHASE * p[slots.OWN_FINENESS] / p[slots.SAMPLE_TIME]
     return rate
+
+
+@compiled(**INNER)
+def _may_jump(
+    state: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
+) -> bool:
+    """Return whether forces of the user's own may jump until steps are looked at again."""
+    at = p[slots.OWN_JUMPS]
+    if at == 0.0:
+        return True
+    x, v, time = state[X], state[V], OWN_AHEAD * p[slots.SAMPLE_TIME]
+    pull = acceleration(state, memory, push, done, p)[0]
+    reach = time * (abs(v) + 0.5 * time * abs(pull))
+    here = formula_value(at, x, v, 0.0, 0.0, 0.0, p)
+    for n in range(-JUMP_POINTS, JUMP_POINTS + 1):
+        place = x + n * reach / JUMP_POINTS
+        if formula_value(at, place, v, 0.0, 0.0, 0.0, p) != here:
+            return True
+    return False
 
 
 @compiled(**INNER)

@@ -230,7 +230,7 @@ def _start(
         That acts at first beside the drive's own; it moves no magnets.
     """
     _couple(p)
-    _take_stock(sample_time, p)
+    take_stock(sample_time, p)
     command = static_command(command, p)
     # One start for both: a lag that is followed by a winding is only the quicker one.
     has_winding = p[slots.RESISTANCE] > 0.0 and p[slots.INDUCTANCE] > 0.0
@@ -294,7 +294,7 @@ def _couple(p: np.ndarray) -> None:
 
 
 @compiled(**INNER)
-def _take_stock(sample_time: float, p: np.ndarray) -> None:
+def take_stock(sample_time: float, p: np.ndarray) -> None:
     """Note what the drive has of what few drives have, so that others need not ask."""
     p[slots.CAPTURE_TIME] = CAPTURE_SHARE * sample_time
     p[slots.SAMPLE_TIME] = sample_time

@@ -123,18 +123,19 @@ enum {
     OWN_WAVES = 119,
     OWN_TURNING = 120,
     OWN_FINENESS = 121,
-    OWN_BENDS = 122,
-    SAMPLE_TIME = 123,
-    LAG_DAMPING_RATIO = 124,
-    SENSOR_LAG = 125,
-    HAS_BRISTLES = 126,
-    BRISTLE_VELOCITY = 127,
-    BRISTLE_DAMPING = 128,
-    BRISTLE_EXCESS = 129,
-    SENSOR_LAG_DAMPING_RATIO = 130,
-    IRON = 131,
-    IS_STRIBECK_EXPONENTIAL = 132,
-    N_SLOTS = 133,
+    OWN_JUMPS = 122,
+    OWN_BENDS = 123,
+    SAMPLE_TIME = 124,
+    LAG_DAMPING_RATIO = 125,
+    SENSOR_LAG = 126,
+    HAS_BRISTLES = 127,
+    BRISTLE_VELOCITY = 128,
+    BRISTLE_DAMPING = 129,
+    BRISTLE_EXCESS = 130,
+    SENSOR_LAG_DAMPING_RATIO = 131,
+    IRON = 132,
+    IS_STRIBECK_EXPONENTIAL = 133,
+    N_SLOTS = 134,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -200,6 +201,7 @@ enum {
     MOST_TRIES = 120,
     NARROWING = 90,
     MOST_TURNS = 60,
+    JUMP_POINTS = 2,
     OFFSET = 0,
     STEADY = 1,
     DRIVEN = 2,
@@ -2431,6 +2433,36 @@ static double drive_rate_of_yielding(double *state, double *memory, double mass,
     return sqrt((stiffness * fading) / mass) + ((0.6 * speed) * sqrt(sqrt(fading)));
 }
 
+static int drive_may_jump(double *state, double *memory, double *push, double done, double *p)
+{
+    double at = 0.0;
+    double x = 0.0;
+    double v = 0.0;
+    double time = 0.0;
+    double pull = 0.0;
+    double reach = 0.0;
+    double here = 0.0;
+    int n = 0;
+    double place = 0.0;
+    at = p[OWN_JUMPS];
+    if (at == 0.0) {
+        return 1;
+    }
+    x = state[X];
+    v = state[V];
+    time = 6.0 * p[SAMPLE_TIME];
+    pull = drive_acceleration(state, memory, push, done, p).m0;
+    reach = time * (fabs(v) + ((0.5 * time) * fabs(pull)));
+    here = drive_formula_value(at, x, v, 0.0, 0.0, 0.0, p);
+    for (n = -JUMP_POINTS; n < JUMP_POINTS + 1; ++n) {
+        place = x + ((n * reach) / JUMP_POINTS);
+        if (drive_formula_value(at, place, v, 0.0, 0.0, 0.0, p) != here) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
 static double drive_rate_of_own(double *state, double *memory, double *push, double done, double mass, double *p)
 {
     double x = 0.0;
@@ -2466,7 +2498,7 @@ static double drive_rate_of_own(double *state, double *memory, double *push, dou
     damping = (drive_own_force(x, v + dv, way, push, done, p) - here) / dv;
     rate = sqrt(stiffness / mass) + (fabs(damping) / mass);
     rate += ((0.12 * p[OWN_WAVES]) * fabs(v)) + (0.12 * p[OWN_TURNING]);
-    if (p[OWN_FINENESS] > 0.0) {
+    if ((p[OWN_FINENESS] > 0.0) && drive_may_jump(state, memory, push, done, p)) {
         rate += (0.3 * p[OWN_FINENESS]) / p[SAMPLE_TIME];
     }
     return rate;
