@@ -34,7 +34,7 @@ from hwid_cli.stages.run_seconds import page_plan, with_start
 from hwid_cli.stages.selection import named_recordings
 from hwid_cli.stages.simulation_units import refused_units
 from hwid_cli.stages.stage import Context, Planning
-from hwid_cli.stages.table import named, needed, stage_named, to_run
+from hwid_cli.stages.table import named, needed, none_named, stage_named, to_run
 from hwid_cli.store.cache import Hdf5Store
 from hwid_cli.tasks.cache import Store
 from hwid_cli.tasks.task import one_thread
@@ -151,6 +151,7 @@ def _show_warnings(experiment: Experiment, checked: Checked, out: Path) -> None:
         # Their results are all that is there.
         if {*needed(name, experiment)} - {"simulate"} == {"calibrate"}:
             said += stage.warnings(context, stage.choose(context))
+    said += [fault] if (fault := none_named(experiment)) else []
     for warning in dict.fromkeys(said):
         click.echo(f"hwid: {warning}", err=True)
 

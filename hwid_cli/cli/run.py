@@ -9,7 +9,7 @@ from hwid_cli.cli.report import write_report
 from hwid_cli.cli.session import Session, open_session
 from hwid_cli.errors import ConfigError, HwidError, NothingToDo
 from hwid_cli.files.atomic import replace_file
-from hwid_cli.stages.table import STAGES, named, needed, stage_named
+from hwid_cli.stages.table import STAGES, named, needed, none_named, stage_named
 from hwid_cli.store.result_files import results_file
 
 
@@ -33,11 +33,7 @@ def _run_stages(session: Session) -> None:
     experiment = session.experiment
     stages = named(experiment)
     if not stages:
-        raise ConfigError(
-            f"{experiment.source}: names no stage; expected some of "
-            f"{', '.join(STAGES)}; add the section of what is to be done, such as "
-            "'crossval: {}'"
-        )
+        raise ConfigError(none_named(experiment))
     for name in stages:
         session.plan(*needed(name, experiment), name)
     if "calibrate" in session.planned:

@@ -120,6 +120,17 @@ def named(experiment: "Experiment") -> tuple[str, ...]:
     return tuple(one for one in STAGES if is_named(one, experiment))
 
 
+def none_named(experiment: "Experiment") -> str:
+    """What to say of a configuration that names no stage; empty where it names one."""
+    if named(experiment):
+        return ""
+    section = "crossval" if experiment.simulation is None else "diagnose"
+    return (
+        f"{experiment.source}: names no stage; expected some of {', '.join(STAGES)}; "
+        f"add the section of what is to be done, such as '{section}: {{}}'"
+    )
+
+
 def to_run(experiment: "Experiment") -> tuple[str, ...]:
     """Stages that ``hwid run`` would run: the named ones, and those that they need."""
     found = {"calibrate"}

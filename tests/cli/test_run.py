@@ -192,13 +192,24 @@ def test_a_wrong_name_is_told_before_anything_is_computed(hwid, edit, out, secti
     assert not (out / "figures").exists()
 
 
-def test_a_configuration_without_any_stage_is_refused(hwid, tmp_path):
+SIMULATION = (
+    "simulation: {mass_kg: 1.0, damping_N_s_per_m: 2.0, force_constant_N_per_A: 3.0}"
+)
+
+
+@pytest.mark.parametrize(
+    ("more", "section"), [("", "crossval"), (SIMULATION, "diagnose")]
+)
+def test_a_configuration_without_any_stage_is_told_which_one_to_name(
+    hwid, tmp_path, more, section
+):
     path = tmp_path / "nothing.yaml"
-    path.write_text("name: nothing\n")
+    path.write_text(f"name: nothing\n{more}\n")
     result = hwid("run", path=path)
 
     assert result.exit_code == 1
-    assert "names no stage" in result.stderr
+    assert "names no stage; expected some of simulate, calibrate" in result.stderr
+    assert f"such as '{section}: {{}}'" in result.stderr
 
 
 def test_a_missing_configuration_is_named(hwid, tmp_path):

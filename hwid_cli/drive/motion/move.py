@@ -295,7 +295,14 @@ def _couple(p: np.ndarray) -> None:
 
 @compiled(**INNER)
 def take_stock(sample_time: float, p: np.ndarray) -> None:
-    """Note what the drive has of what few drives have, so that others need not ask."""
+    """Note what the drive has of what few drives have, so that others need not ask.
+
+    Parameters
+    ----------
+    sample_time : float, [s]
+    p : ndarray, shape (N_SLOTS,)
+        Changed in place.
+    """
     p[slots.CAPTURE_TIME] = CAPTURE_SHARE * sample_time
     p[slots.SAMPLE_TIME] = sample_time
     has_zero_edge = p[slots.PRELOAD] > 0.0 or p[slots.SPRING_SHARE] > 0.0
