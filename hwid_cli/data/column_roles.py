@@ -54,6 +54,7 @@ _AGAINST = -0.6
 # What is held by so much more of its samples than the other is a command, [-].
 _CLEARLY_HELD = 0.5
 _ANSWERS = "by its content: it answers to the input"
+_IS_COMMAND = "by its name, a command: no other column is named an input"
 _IS_ANSWERED = "by its content: the output answers to it"
 # How much being smoother than the input counts beside the answer to it, [-].
 _SMOOTHER = 0.25
@@ -248,6 +249,8 @@ def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
     if outputs:
         others = free or [one for one in named if one not in outputs] or outputs[1:]
         first = max(others, key=lambda one: _answer(one, outputs[0]))
+        if (told := _told(named, first, outputs[0])) is not None:
+            return told, outputs[0], {"input": _IS_COMMAND, "output": _by(outputs[0])}
         last, why = _chosen_output(first, [one for one in outputs if one != first])
         is_sure = not may_drive(last.meaning)
         return _as_they_answer(
@@ -262,6 +265,15 @@ def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
     if len(pool) < 2:
         raise _too_few(len(pool), [one.column for one in named])
     return _by_content(pool)
+
+
+def _told(named: list[_Named], first: _Named, last: _Named) -> _Named | None:
+    """What a controller is told, where it drives an output more clearly than the rest."""
+    told = _of_role(named, "reference")
+    best = max(told, key=lambda one: _answer(one, last), default=None)
+    if best is None or _answer(first, last) > _CLEAR:
+        return None
+    return best if _answer(best, last) > max(_answer(first, last), _CLEAR) else None
 
 
 def _as_they_answer(

@@ -616,6 +616,13 @@ def _patterns(
     if len(alike) > 1 and not endings & others:
         below = "**/" if any("/" in one.name for one in alike) else ""
         return tuple(f"{below}*{ending}" for ending in sorted(endings))
+    names = {PurePosixPath(one.name).name for one in alike}
+    if len(alike) > 1 and len(names) == 1:
+        name = names.pop()
+        if all(
+            PurePosixPath(one.name).name != name for one in files if one not in alike
+        ):
+            return (f"**/{glob.escape(name)}",)
     return tuple(glob.escape(one.name) for one in alike)
 
 

@@ -19,6 +19,7 @@ from hwid_cli.data.arrow_files import open_arrow
 from hwid_cli.data.columns import ROLES, FileColumns, MeasuredColumn
 from hwid_cli.data.csv_files import list_csv_columns, read_csv_columns
 from hwid_cli.data.hdf5_files import open_hdf5
+from hwid_cli.data.json_files import open_json
 from hwid_cli.data.mat_files import open_mat
 from hwid_cli.data.mdf_files import open_mdf
 from hwid_cli.data.npz_files import open_npz
@@ -102,6 +103,7 @@ READERS = (
         is_isolated=True,
         is_one_table=True,
     ),
+    _of_arrays(".jsonl", ".ndjson", ".json", opened=open_json),
     _of_arrays(".tdms", opened=open_tdms, needs="npTDMS"),
     _of_arrays(".mf4", ".mdf", opened=open_mdf, needs="asammdf"),
     _of_arrays(".parquet", ".feather", ".arrow", opened=open_arrow, needs="pyarrow"),

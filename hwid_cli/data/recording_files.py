@@ -8,6 +8,7 @@ import glob
 import io
 import os
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -45,8 +46,8 @@ def recordings_base(experiment: Experiment, out: Path) -> Path:
     return Path(out) if experiment.simulate else Path(experiment.source).parent
 
 
-def find_files(experiment: Experiment, base: Path) -> list[Path]:
-    """Find the files of an experiment's recordings.
+def find_files(experiment: Experiment, base: Path) -> dict[Path, str]:
+    """Find the files of an experiment's recordings, each with its name.
 
     Parameters
     ----------
@@ -55,9 +56,10 @@ def find_files(experiment: Experiment, base: Path) -> list[Path]:
 
     Returns
     -------
-    list of Path
+    dict of Path to str
         In natural order (``step_2`` before ``step_10``); ``plan.csv`` and excluded
-        files are left out. Empty only where ``recordings.optional`` allows it.
+        files are left out, which changes no name. Empty only where
+        ``recordings.optional`` allows it.
 
     Raises
     ------
@@ -74,13 +76,14 @@ def find_files(experiment: Experiment, base: Path) -> list[Path]:
         found.update(dict.fromkeys(matches))
         if not matches:
             barren.append(pattern)
-    paths = [path for path in found if not _is_excluded(path, options)]
+    names = names_of_files(list(found))
+    paths = [path for path in found if not _is_excluded(path, names[path], options)]
     if not paths and options.optional:
-        return []
+        return {}
     if barren or not paths:
         raise MeasurementError(missing_files_message(experiment, base))
     paths.sort(key=lambda path: (_natural(path.stem), str(path)))
-    return paths
+    return {path: names[path] for path in paths}
 
 
 def missing_files_message(experiment: Experiment, base: Path) -> str:
@@ -154,11 +157,36 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def _is_excluded(path: Path, options: RecordingsOptions) -> bool:
+def _is_excluded(path: Path, name: str, options: RecordingsOptions) -> bool:
     return any(
-        fnmatchcase(path.stem, pattern) or fnmatchcase(path.name, pattern)
+        fnmatchcase(called, pattern)
         for pattern in options.exclude
+        for called in (path.stem, path.name, name)
     )
+
+
+def names_of_files(paths: Sequence[Path]) -> dict[Path, str]:
+    """Names of the recordings of some files: without ending, or those of their folders.
+
+    Examples
+    --------
+    >>> list(names_of_files([Path("x/run_1.csv"), Path("x/run_2.csv")]).values())
+    ['run_1', 'run_2']
+    >>> list(names_of_files([Path("bag 1/joint.csv"), Path("bag 2/joint.csv")]).values())
+    ['bag_1', 'bag_2']
+    >>> told = [Path("a/slow.csv"), Path("b/slow.csv"), Path("b/fast.csv")]
+    >>> list(names_of_files(told).values())
+    ['a_slow', 'b_slow', 'fast']
+    """
+    counts = Counter(path.stem for path in paths)
+    is_one = len(counts) == 1
+    found = {}
+    for path in paths:
+        parts = [] if is_one else [path.stem]
+        if counts[path.stem] > 1 and path.parent.name:
+            parts.insert(0, _as_name(path.parent.name))
+        found[path] = "_".join(parts) or path.stem
+    return found
 
 
 def expand_variables(pattern: str, experiment: Experiment) -> str:
@@ -239,8 +267,15 @@ class FilePart:
         return Path(f"{self.path} ({', '.join(inside)})") if inside else self.path
 
 
-def parts_of_files(paths: Sequence[Path], options: RecordingsOptions) -> list[FilePart]:
+def parts_of_files(
+    names: Mapping[Path, str], options: RecordingsOptions
+) -> list[FilePart]:
     """Say which recordings the files of an experiment hold.
+
+    Parameters
+    ----------
+    names : mapping of Path to str
+        Of the files, from ``find_files``.
 
     Returns
     -------
@@ -252,17 +287,18 @@ def parts_of_files(paths: Sequence[Path], options: RecordingsOptions) -> list[Fi
         last = options.last_sample
         stop = None if last is None else last + 1
         return [
-            FilePart(path, path.stem, "", options.first_sample, stop) for path in paths
+            FilePart(path, name, "", options.first_sample, stop)
+            for path, name in names.items()
         ]
     return [
         FilePart(
             path,
-            part if len(paths) == 1 else f"{path.stem}_{part}",
+            part if len(names) == 1 else f"{name}_{part}",
             part,
             cut[0],
             cut[1],
         )
-        for path in paths
+        for path, name in names.items()
         for part, cut in options.parts.items()
     ]
 
@@ -278,7 +314,8 @@ def parts_of_tables(
         Named after the table too where there are several; after it alone where the
         experiment has one file, which is not cut.
     """
-    last = [_as_name(re.split(r"[./]", table)[-1]) for table in tables]
+    # A point in front of a digit is one of a number: sine_0.5Hz.
+    last = [_as_name(re.split(r"/|\.(?!\d)", table)[-1]) for table in tables]
     if len(set(last)) < len(last):
         last = [_as_name(table) for table in tables]
     found = []

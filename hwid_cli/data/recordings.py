@@ -106,15 +106,15 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
 
 
 def _by_path(
-    paths: Sequence[Path], options: RecordingsOptions
+    names: Mapping[Path, str], options: RecordingsOptions
 ) -> dict[Path, list[FilePart]]:
     """Recordings of each file; a variable with a star stands for several tables."""
-    found: dict[Path, list[FilePart]] = {path: [] for path in paths}
-    for part in parts_of_files(paths, options):
+    found: dict[Path, list[FilePart]] = {path: [] for path in names}
+    for part in parts_of_files(names, options):
         found[part.path].append(part)
     if "*" not in (options.columns.variable or ""):
         return found
-    is_only = len(paths) == 1
+    is_only = len(names) == 1
     return {
         path: parts_of_tables(
             parts, tables_of(path, options.columns), is_only_file=is_only
@@ -306,7 +306,7 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
     """
     options = recordings_options(experiment)
     problems: list[str] = []
-    paths: list[Path] = []
+    paths: dict[Path, str] = {}
     by_path: dict[Path, list[FilePart]] = {}
     with _noting(problems):
         paths = find_files(experiment, recordings_base(experiment, out))

@@ -44,6 +44,13 @@ _OTHER_WORDS = frozenset(
         *("samples", "date", "hunit", "horizontalunits", "horizontalunit"),
     ]
 )
+# How a logger made the numbers of each column from its readings.
+_PROCESSED = frozenset(
+    [
+        *("smp", "avg", "min", "max", "std", "tot", "wvc", "med", "smm", "mom", "cov"),
+        *("sample", "average", "mean", "minimum", "maximum", "total"),
+    ]
+)
 # Words in front of factors by which whole numbers become quantities.
 _SCALE_WORDS = frozenset(
     [
@@ -396,6 +403,8 @@ def _name_row(
         cells = [cell for cell in _cells(row, numeric) if cell]
         if 2 * len(cells) < len(numeric) or all(map(is_quantity, cells)):
             continue
+        if number != above[0] and all(_letters(cell) in _PROCESSED for cell in cells):
+            continue
         key = _letters(next(cell for cell in row if cell))
         # In front of the columns, or of each pair of them, stands what a row is about.
         is_about = bool(row[0]) and (0 not in numeric or row.count(row[0]) > 1)
@@ -410,7 +419,8 @@ def _name_row(
             units = {**_units_of(row, numeric), **units}
             continue
         is_other = key in _OTHER_WORDS
-        if (is_named or number != above[0]) and not is_other and _is_unit_row(cells):
+        is_units = _is_unit_row(cells) or _is_below_names(rows, above, number, numeric)
+        if (is_named or number != above[0]) and not is_other and is_units:
             units = {**_units_of(row, numeric), **units}
         elif not is_about or key in _NAME_WORDS:
             upper = above[: above.index(number)]
@@ -418,6 +428,24 @@ def _name_row(
         fallback = number if fallback < 0 else fallback
     # A lone row of units is one of names too, unless others stand elsewhere.
     return -1 if is_named and units else fallback, units
+
+
+def _is_below_names(
+    rows: Sequence[Sequence[str]],
+    above: Sequence[int],
+    number: int,
+    numeric: Sequence[int],
+) -> bool:
+    """Whether a row with a unit says the same of two columns, below one that names each."""
+    place = above.index(number)
+    if not place:
+        return False
+    here, names = (_cells(rows[n], numeric) for n in (number, above[place - 1]))
+    words = [cell for cell in here if cell]
+    if not any(map(looks_like_unit, words)):
+        return False
+    is_full = all(names) and not any(map(is_quantity, names))
+    return is_full and len(set(words)) < len(words) and len(set(names)) == len(names)
 
 
 def _is_title(row: Sequence[str]) -> bool:

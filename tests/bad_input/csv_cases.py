@@ -165,9 +165,11 @@ NAMES = [
         lambda folder: (
             (folder / "b").mkdir(),
             (folder / "b" / _FILE).write_text(csv_text()),
+            (folder / "c" / "b").mkdir(parents=True),
+            (folder / "c" / "b" / _FILE).write_text(csv_text()),
             config(folder, _FILE, "'**/*.csv'"),
         ),
-        *("'run'", "every name once"),
+        *("'b'", "every name once"),
     ),
 ]
 # What looks odd and is good.

@@ -480,3 +480,20 @@ def test_counts_of_a_position_and_a_sensors_amplifier_are_outputs_still():
         ("drive voltage", VOLTAGE, "V"), ("Charge Amp Out", POSITION, "V")
     )
     assert (first, last) == ("drive voltage", "Charge Amp Out")
+
+
+def test_what_a_pump_is_told_is_its_input_where_nothing_else_is_named_one():
+    """Pressure and flow answer to the speed together: neither drives the other."""
+    told = np.repeat(np.random.default_rng(5).uniform(800, 2400, N // 40), 40)
+    speed = np.zeros(N)
+    for k in range(1, N):
+        speed[k] = speed[k - 1] + 0.2 * (told[k - 1] - speed[k - 1])
+    noise = np.random.default_rng(6).standard_normal((3, N))
+    found = guessed(
+        ("n_soll", told, "1/min"),
+        ("n_ist", np.round(speed + noise[0]), "1/min"),
+        ("p_aus", 1e-6 * speed**2 + 0.01 * noise[1], "bar"),
+        ("q", 0.01 * speed + 0.05 * noise[2], "l/min"),
+    )
+    assert found[0] == "n_soll"
+    assert found[2].reasons["input"].startswith("by its name, a command")

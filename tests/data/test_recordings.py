@@ -158,11 +158,22 @@ def test_short_recording_is_refused(tiny, write_csv, signals):
         read(tiny())
 
 
-def test_equal_names_in_two_folders_are_refused(tiny, write_csv):
+def test_equal_names_in_two_folders_are_those_of_the_folders(tiny, write_csv):
     write_csv("one/a.csv")
-    write_csv("two/a.csv")
-    with pytest.raises(MeasurementError, match=r"two/a.csv: gives the recording name"):
-        read(tiny(files="'*/a.csv'"))
+    write_csv("two 2/a.csv")
+    assert [one.name for one in read(tiny(files="'*/a.csv'"))] == ["one", "two_2"]
+
+    kept = read(tiny(files="'*/a.csv'", more="exclude: [two*]"))
+    assert [one.name for one in kept] == ["one"]
+
+
+def test_names_that_folders_do_not_tell_apart_are_refused(tiny, write_csv):
+    write_csv("x/one/a.csv")
+    write_csv("y/one/a.csv")
+    with pytest.raises(
+        MeasurementError, match=r"y/one/a.csv: gives the recording name 'one'"
+    ):
+        read(tiny(files="'*/one/a.csv'"))
 
 
 def test_file_of_two_kinds_is_refused(tiny, write_csv):

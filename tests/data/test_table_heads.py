@@ -20,6 +20,26 @@ def test_units_stand_below_the_names():
     assert found.units == {0: "ms", 1: "mA", 2: "inc"}
 
 
+def test_a_logger_says_below_names_and_units_how_numbers_came_about():
+    found = head(
+        ["TOA5", "Plate", "CR1000", "34211"],
+        ["TIMESTAMP", "RECORD", "Heater", "T_in", "T_out"],
+        ["TS", "RN", "%", "Deg C", "Deg C"],
+        ["", "", "Smp", "Avg", "Avg"],
+        body=[
+            [f"2023-02-13 08:00:{k:02d}", f"{k}", "1.5", "20.1", "20.2"]
+            for k in range(20)
+        ],
+    )
+    assert found.names == ("TIMESTAMP", "RECORD", "Heater", "T_in", "T_out")
+    assert found.body == 4
+    assert {k: found.units[k] for k in (2, 3, 4)} == {2: "%", 3: "Deg C", 4: "Deg C"}
+
+
+def test_columns_that_are_called_as_a_way_of_counting_keep_their_names():
+    assert head(["t", "min", "max"]).names == ("t", "min", "max")
+
+
 def test_no_header_is_no_name():
     assert head().names == ()
     assert head().body == 0
