@@ -597,20 +597,17 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         n,
         given.options.max_effects,
         planning.workers,
-        searches=1
-        if isinstance(given.simulation, SimulationOptions)
-        else MOST_SEARCHES,
+        searches=MOST_SEARCHES,
+        may_be_law=given.options.laws != "never",
     )
     what = f"{counted(n, 'recording')} x {counted(found.n_tasks, 'effect')}"
     if found.by_runs:
         what = f"{counted(n, 'recording')}; {LEAST_RUNS} to {MOST_RUNS} runs of the simulation"
     elif not found.n_tasks:
         what = f"{counted(n, 'recording')}; no effect is looked for"
-    why = "one effect is not enough"
-    if not isinstance(given.simulation, SimulationOptions):
-        why += " and the search is repeated beside other parameters"
+    why = "one effect is not enough and the search is repeated"
     if given.options.laws != "never":
-        why += ", several times that if no effect is and laws are searched for"
+        why += ", or laws are searched for"
     return (
         StagePlan(
             NAME,

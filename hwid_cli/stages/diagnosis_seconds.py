@@ -26,6 +26,9 @@ _EACH = 4
 _SINGLE_EFFECTS = 1.2
 # A set of effects against a single one: more parameters, more of the motion, [-].
 _SET_OF_EFFECTS = 1.5
+# A law is fitted from few starts, but its terms are many, and worked off one by one: its
+# fit against one of the screening, and how many there are, [-].
+_LAW, _LAWS = 8.0, 16
 # Runs of the user's simulation with a candidate inside, for each recording, [-].
 _CONFIRMING_RUNS = 9
 # A simulation of the user's own is not run for longer to say how long it takes, [s].
@@ -123,6 +126,7 @@ def time_diagnosis(
     workers: int,
     *,
     searches: int = 1,
+    may_be_law: bool = False,
 ) -> DiagnosisTime:
     """Time the beginning of a diagnosis, and count the rounds that may follow.
 
@@ -136,7 +140,10 @@ def time_diagnosis(
     workers : int, [-]
         Processes that share its rounds.
     searches : int, [-]
-        Most that follow each other, beside parameters that the last one has moved.
+        Most that follow each other: beside parameters that the last one has moved, a
+        better base, a held command, or behind a filter for noise.
+    may_be_law : bool
+        Whether laws are searched for where effects do not settle it.
     """
     sampler = _Sampler()
     start = time.process_time()
@@ -160,6 +167,9 @@ def time_diagnosis(
     single = _SINGLE_EFFECTS * sampler.screening / _gain(sampler.n_tasks, workers)
     rounds = searches * (1 + MOST_SCREENINGS)
     most = rounds * single * (1.0 + _sets_for_one(sampler.n_tasks, max_effects))
+    if may_be_law and sampler.n_tasks:
+        each = sampler.screening / sampler.n_tasks
+        most += _LAW * _LAWS * each / _gain(_LAWS, workers)
     most += (most_confirming - confirming) / workers
     return DiagnosisTime(fixed + single, fixed + most, sampler.n_tasks)
 

@@ -126,3 +126,25 @@ def test_searches_that_follow_each_other_are_the_longer_end(clock):
     assert three.seconds == one.seconds
     single = one.seconds - 0.6 - 0.7
     assert three.most_seconds - one.most_seconds == pytest.approx(6 * single)
+
+
+def test_laws_are_the_longer_end_where_they_may_be_searched_for(clock):
+    def diagnose(run, on_round):
+        on_round("single effects, screening", 40)
+        run([task(clock, 0.5) for _ in range(40)], keep=True)
+
+    without, laws = (
+        time_diagnosis(diagnose, 6, 1, 1, may_be_law=may) for may in (False, True)
+    )
+    assert laws.seconds == without.seconds
+    # Two laws of each of four lengths, as forces and of the sensor, each as long as eight.
+    assert laws.most_seconds - without.most_seconds == pytest.approx(16 * 8 * 0.5)
+
+
+def test_a_drive_that_leaves_nothing_needs_no_law(clock):
+    def diagnose(run, on_round):
+        on_round("base", 0)
+        clock.now += 1.0
+
+    found = time_diagnosis(diagnose, 6, 1, 1, may_be_law=True)
+    assert found.most_seconds == found.seconds
