@@ -6,6 +6,7 @@ docs/method_diagnosis.md, eq. (D35).
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 
@@ -17,6 +18,8 @@ _PLACES = (0.3, 0.5, 0.7)
 _SPEEDS = (0.3, 0.6)
 # The same at which a force levels off.
 _BENDS = (0.15, 0.4)
+# The same at which it peaks, to either side, and how wide a peak is.
+_PEAKS, _WIDTHS = (0.1, 0.35, 0.7), (0.1, 0.3)
 _MOST_WAVES = 2
 # Exponents that a power is tried with before it is refined.
 _POWERS = (0.5, 1.5, 2.0, 3.0, 5.0)
@@ -194,6 +197,14 @@ def _thresholds(scales: Scales) -> Iterator[Term]:
         # Air, magnetic and contact forces near a wall, on either side.
         yield Term("exp(-x/a)", (0, 0, 0), a, "fades along the way")
         yield Term("exp(x/a)", (0, 0, 0), a, "grows along the way")
+    for share, width in product(_PEAKS, _WIDTHS):
+        # A magnet, a detent, a worn place.
+        a = {
+            "a": (share * scales.displacement_m, "m"),
+            "b": (width * scales.displacement_m, "m"),
+        }
+        yield Term("1/(1 + ((x - a)/b)**2)", (0, 0, 0), a, "peaks at a place")
+        yield Term("1/(1 + ((x + a)/b)**2)", (0, 0, 0), a, "peaks at a place below")
     yield Term("Heaviside(x)*sign(v)", (0, 0, 0))
     yield Term("Heaviside(v)*v**2", (2, -2, 0))
 

@@ -1,5 +1,6 @@
 """Laws that no catalogue holds, in a machine with an integrator of its own."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -204,6 +205,23 @@ def test_a_law_that_held_out_recordings_do_not_share_is_refused():
     told = diagnose(machine(law, dict.fromkeys(names, other)), SIMULATION, options)
     assert told.verdict == "unknown"
     assert told.law is None
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("place", [0.006, -0.009])
+def test_a_magnet_beside_the_way_is_told_with_its_place_and_its_reach(place):
+    def pull(x, v, u, t, way):
+        return 2.0 / (1.0 + ((x - place) / 0.0018) ** 2)
+
+    told = diagnose(machine(Hidden(pull)), SIMULATION, NOTHING)
+    (term,) = told.law.terms
+    shape = re.fullmatch(r"1/\(1 \+ \(\(x ([-+]) (.+)\)/(.+)\)\*\*2\)", term.term)
+
+    assert told.complete
+    assert term.value == pytest.approx(2.0, rel=0.05)
+    assert shape[1] == ("-" if place > 0 else "+")
+    assert float(shape[2]) == pytest.approx(abs(place), rel=0.03)
+    assert float(shape[3]) == pytest.approx(0.0018, rel=0.1)
 
 
 @pytest.mark.thorough
