@@ -289,9 +289,15 @@ def _law(law: LawFound | None, effects: Sequence[FittedEffect]) -> Law | None:
     )
     if law.acts_on == "force":
         # Term by term, the largest first.
-        text = " + ".join(f"{one.value:.6g}*{one.term}" for one in terms)
+        text = " + ".join(_weighted(one.value, one.term) for one in terms)
         return Law(text.replace("+ -", "- "), law.acts_on, terms)
     return Law(as_text(node).replace("+ -", "- "), law.acts_on, terms)
+
+
+def _weighted(value: float, term: str) -> str:
+    """A term with its coefficient."""
+    over_one = term.startswith("1/")
+    return f"{value:.6g}{term[1:]}" if over_one else f"{value:.6g}*{term}"
 
 
 def _force_curves(

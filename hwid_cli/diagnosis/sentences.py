@@ -1,5 +1,6 @@
 """What a diagnosis says in words: the summary, and what recordings cannot show."""
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -172,11 +173,20 @@ def law_in_words(
         else "No effect of the catalogue is what the simulation lacks, but a formula holds"
     )
     return (
-        f"{text}: {effect.equation}. With it the error on held-out recordings falls from "
+        f"{text}: {_in_numbers(law, effect)}. With it the error on held-out recordings falls from "
         f"{criteria.ratio(base):.3g} to {criteria.ratio(verdict.chosen):.3g} times the "
         f"noise ({share:.3g} % of what was left is explained)."
         f"{_how_sure(law)}{_rest(criteria, verdict)}"
     )
+
+
+def _in_numbers(law: Law, effect: FittedEffect) -> str:
+    """The formula with its values, to four digits; in the table stand all of them."""
+    symbol = effect.equation.partition(" = ")[0]
+    short = re.sub(
+        r"\d+\.\d+(?:e[-+]\d+)?", lambda found: f"{float(found[0]):.4g}", law.formula
+    )
+    return f"{symbol} = {short}"
 
 
 def _how_sure(law: Law) -> str:

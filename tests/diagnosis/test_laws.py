@@ -218,6 +218,7 @@ def test_a_magnet_beside_the_way_is_told_with_its_place_and_its_reach(place):
     shape = re.fullmatch(r"1/\(1 \+ \(\(x ([-+]) (.+)\)/(.+)\)\*\*2\)", term.term)
 
     assert told.complete
+    assert re.search(r"formula holds: F = (2|2\.0\d+|1\.9\d+)/\(1 \+ ", told.summary)
     assert term.value == pytest.approx(2.0, rel=0.05)
     assert shape[1] == ("-" if place > 0 else "+")
     assert float(shape[2]) == pytest.approx(abs(place), rel=0.03)
