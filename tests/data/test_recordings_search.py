@@ -6,8 +6,10 @@ import pytest
 
 from hwid_cli.config.load import load_experiment
 from hwid_cli.data.recording_files import (
+    FilePart,
     find_files,
     missing_files_message,
+    parts_of_tables,
     recordings_base,
 )
 from hwid_cli.data.recordings import read_recordings
@@ -148,3 +150,17 @@ def test_experiment_without_recordings_is_refused(write_config):
     experiment = load_experiment(write_config("name: a\n"))
     with pytest.raises(ConfigError, match=r"recordings: missing; expected which files"):
         read(experiment)
+
+
+@pytest.mark.parametrize(
+    ("tables", "names"),
+    [
+        (["01_steps", "02_sine_0.5Hz"], ["01_steps", "02_sine_0_5Hz"]),
+        (["log.run1", "log.run2"], ["run1", "run2"]),
+        (["a/x", "b/x"], ["a_x", "b_x"]),
+    ],
+)
+def test_a_point_in_a_number_does_not_part_the_name_of_a_table(tables, names):
+    part = FilePart(Path("log.xlsx"), "log", "", 0, None)
+    found = parts_of_tables([part], tables, is_only_file=True)
+    assert [one.name for one in found] == names

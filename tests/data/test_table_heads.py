@@ -37,7 +37,7 @@ def test_a_logger_says_below_names_and_units_how_numbers_came_about():
 
 
 def test_columns_that_are_called_as_a_way_of_counting_keep_their_names():
-    assert head(["t", "min", "max"]).names == ("t", "min", "max")
+    assert head(["mean", "min", "max"]).names == ("mean", "min", "max")
 
 
 def test_no_header_is_no_name():

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.problem import with_level_of_rest
+from hwid_cli.diagnosis.problem import prepare, with_level_of_rest
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import Drive
+from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
+from hwid_cli.records.recordings import Recording
 
 N, STEP, NOISE = 2000, 1e-3, 0.01
 
@@ -56,3 +58,16 @@ def test_friction_keeps_no_displacement_that_is_noise():
         return abs(found[-1] - true)
 
     assert error(with_level_of_rest(measured)) < error(measured) / 4
+
+
+def test_a_diagnosis_starts_with_the_level_of_the_rest():
+    measured = step_after(400) + noise_of(5)
+    recording = Recording("a", measured, np.cumsum(measured), STEP)
+    simulation = SimulationOptions(
+        mass_kg=1.0, damping_N_s_per_m=2.0, force_constant_N_per_A=3.0
+    )
+    (of,) = prepare([recording], simulation, DiagnoseOptions(), ()).signals
+
+    assert abs(of.driven_by[0] - 0.2) < NOISE / 5
+    np.testing.assert_array_equal(of.driven_by[1:], measured[1:])
+    np.testing.assert_array_equal(of.input, measured)

@@ -133,6 +133,18 @@ def test_the_filter_follows_magnets_that_the_simulation_has(seed):
     assert linked["followed"] < 2 / np.sqrt(left.size) < 0.1 < linked["straight"]
 
 
+def test_a_filter_along_a_motion_sees_what_is_not_evaluated():
+    noise = floor(0.1)
+    drive, signals, left = over_magnets(1, noise.input_rms, noise.rms)
+    part = replace(signals, skip=1400, compared=signals.compared + left)
+    of = replace(problem(), signals=(part,), drive=drive)
+    free = with_noise_filter(of, drive, noise).signals[0].left(signals.output)
+
+    assert free.size == left.size - 1400
+    assert np.std(free) == pytest.approx(noise.rms, rel=0.06)
+    assert abs(free[1:] @ free[:-1]) < 2.5 * np.sqrt(free.size) * noise.rms**2
+
+
 def test_a_filter_along_a_motion_leaves_other_motions_to_its_mean():
     noise = floor(0.1)
     drive, signals, left = over_magnets(1, noise.input_rms, noise.rms)

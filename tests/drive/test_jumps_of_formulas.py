@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from hwid_cli.drive import formula as text
-from hwid_cli.drive.simulation import simulate_drive
+from hwid_cli.drive import slots
+from hwid_cli.drive.simulation import drive_effects, parameter_vector, simulate_drive
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id
 
@@ -107,3 +108,17 @@ def test_signs_of_the_position_are_told_apart_by_their_sum():
 @pytest.mark.parametrize("formula", ["sign(x - u)", "sign(u) + sign(x)", "-sign(v)*x"])
 def test_jumps_that_do_not_go_with_the_position_alone_may_be_anywhere(formula):
     assert text.jumps_along(text.parsed(formula)) is None
+
+
+@pytest.mark.parametrize(
+    ("formula", "is_told"), [("a*Heaviside(x - 0.001)", True), ("a*sign(x - u)", False)]
+)
+def test_the_loops_are_told_where_a_force_jumps(formula, is_told):
+    stated = OwnEffect(force_N=formula, parameters={"a": OwnParameter("N")})
+    drive = Drive(
+        MASS, DAMPING, STIFFNESS, GAIN, effects={own_id("m", stated): {"a": 1.0}}
+    )
+    vector = parameter_vector(drive, drive_effects(drive))
+
+    assert bool(vector[slots.OWN_JUMPS]) is is_told
+    assert vector[slots.OWN_FINENESS] > 1.0
