@@ -107,7 +107,8 @@ def _listed(path: Path, folder: Path) -> FoundFile:
     # The readers of foreign formats raise whatever their parser stumbles on.
     except Exception as error:
         said = " ".join(str(error).removeprefix(f"{path}: ").split())
-        return FoundFile(name, problem=escaped(said[:160]) or type(error).__name__)
+        # What says which library to install is not to be cut off.
+        return FoundFile(name, problem=escaped(said[:400]) or type(error).__name__)
     return FoundFile(name, columns, "" if columns else "no table of numbers")
 
 
@@ -316,6 +317,10 @@ def _lacking(files: Sequence[FoundFile], signals: Sequence[FoundColumn]) -> int:
 
 def _no_signals(files: Sequence[FoundFile]) -> str:
     """What to say of a folder in which no file holds two signals."""
+    lacking = (one for one in files if "pip install" in one.problem)
+    first = next(lacking, None)
+    if first is not None:
+        return f"{escaped(first.name)}: {first.problem}"
     first = next((one for one in files if not one.problem), files[0])
     said = first.problem or _too_short(first.columns)
     said = said or "holds no two columns of the same table"

@@ -62,11 +62,17 @@ def with_further_effect(
 
 
 def _with_known(first: Findings, second: Findings, known: str) -> Findings | None:
-    """Findings of both effects, from those of the second one beside the first."""
+    """Findings of both effects, from those of the second one beside the first.
+
+    None where no pair may be named, or where the second one was fitted through runs of
+    the simulation, whose stand-in has no values of the first.
+    """
+    if not _holds(second.verdict.chosen, known):
+        return None
     pairs = [
         _as_pair(fit, known)
         for fit in second.found.fits.values()
-        if len(fit.effects) == 1 and known not in fit.effects
+        if len(fit.effects) == 1 and known not in fit.effects and _holds(fit, known)
     ]
     drive = replace(second.problem.drive, effects=first.problem.drive.effects)
     problem = replace(second.problem, drive=drive)
@@ -85,6 +91,11 @@ def _with_known(first: Findings, second: Findings, known: str) -> Findings | Non
         return None
     found = replace(first.found, fits=fits)
     return replace(first, problem=problem, verdict=verdict, found=found)
+
+
+def _holds(fit: CandidateFit, effect: str) -> bool:
+    """Whether a fit has values of an effect, present or added."""
+    return any(one.owner == effect for one in fit.names)
 
 
 def _as_pair(fit: CandidateFit, known: str) -> CandidateFit:

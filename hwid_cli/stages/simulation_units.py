@@ -119,6 +119,11 @@ def _fault(
             f"{expected}; name another column, or say recordings.{side}_unit: "
             f"{unit_in_si(unit, others)} if the simulation's numbers stand in it"
         )
+    if side == "output" and factor_between(unit, f"{wanted}/s") is not None:
+        return (
+            f"{expected}; a sensor that measures the velocity is "
+            "simulation.output: velocity; else name another column"
+        )
     return f"{expected}; name another column, or correct recordings.units.{side}"
 
 

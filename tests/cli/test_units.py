@@ -289,3 +289,11 @@ def test_a_prediction_takes_any_unit_that_goes_into_the_models(tmp_path):
     assert "says that time 't' is in 'm'; expected a unit of time" in predicted(
         ["t,i", "m,A"], (1.0, 1.0)
     )
+
+
+@pytest.mark.parametrize("unit", ["mm/s", "m/s"])
+def test_a_velocity_is_told_what_makes_it_one(tmp_path, unit):
+    path = write_experiment(tmp_path, f"time_s,current_A,y [{unit}]")
+    result = run("run", path, "--out", str(tmp_path / "out"))
+    assert result.exit_code == 1
+    assert "simulation.output: velocity" in result.stderr

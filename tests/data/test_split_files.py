@@ -135,3 +135,13 @@ def test_a_file_that_names_its_own_input_needs_no_other_one(tmp_path):
     layout = guess_layout(list_measurements(tmp_path))
 
     assert (layout.input.key, layout.output_file) == (".current", None)
+
+
+def test_a_library_that_is_missing_is_named_before_a_note_beside_the_files():
+    lacks = (
+        "is read by python-calamine, which is missing; run: pip install 'hwid[formats]'"
+    )
+    note = FoundFile("NOTES.txt", (FoundColumn("m", "m", np.arange(3.0)),))
+    with pytest.raises(MeasurementError, match=r"^run\.xlsx: .*pip install") as told:
+        guess_layout([note, FoundFile("run.xlsx", (), lacks)])
+    assert str(told.value).endswith("'hwid[formats]'")

@@ -91,12 +91,26 @@ def test_no_second_effect_is_asked_for_once_the_runs_are_spent(monkeypatch):
     assert with_further_effect(first, runs, DiagnoseOptions(), None) is first
 
 
-@pytest.mark.parametrize(("left", "is_pair"), [(109.0, False), (100.0, True)])
-def test_a_pair_is_told_only_where_it_may_be_named(monkeypatch, left, is_pair):
-    """Beside it stands all that was fitted before, and the first effect itself."""
+@pytest.mark.parametrize(
+    ("left", "holds_both", "is_pair"),
+    [(109.0, True, False), (100.0, True, True), (100.0, False, False)],
+)
+def test_a_pair_is_told_only_where_it_may_be_named(
+    monkeypatch, left, holds_both, is_pair
+):
+    """Beside it stands all that was fitted before, and the first effect itself.
+
+    A dead zone that was fitted through the simulation's own runs has no values of the
+    stop that acts in it.
+    """
     one, two = "coulomb_friction", "cubic_stiffness"
     alone = made_up((one,), 110.0, whiteness=0.5 if not is_pair else 3.0)
-    both = made_up((two,), left, parameters=2, whiteness=0.5)
+    owners = (one, two) if holds_both else (two, two)
+    both = replace(
+        made_up((two,), left, parameters=2, whiteness=0.5),
+        names=tuple(ParameterRef(owner, "force_N") for owner in owners),
+        values=np.ones(2),
+    )
     of = problem(recordings({}))
     monkeypatch.setattr(further_effects, "unclear_effects", lambda *_: ())
     monkeypatch.setattr(further_effects, "replace", replaced)
