@@ -21,6 +21,10 @@ class MissingColumnError(MeasurementError):
     """A measurement file lacks a column that is asked for."""
 
 
+class MissingLibraryError(MeasurementError):
+    """A measurement file needs a library that is not installed."""
+
+
 class CacheError(HwidError):
     """The cache or a results file cannot be read or written."""
 

@@ -31,7 +31,7 @@ from hwid_cli.data.header_stamps import topic_of
 from hwid_cli.data.recording_files import PLAN_NAME
 from hwid_cli.data.sampling import missing_samples
 from hwid_cli.data.split_files import split_recordings
-from hwid_cli.errors import ConfigError, MeasurementError
+from hwid_cli.errors import ConfigError, MeasurementError, MissingLibraryError
 from hwid_cli.files.messages import escaped
 from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
 
@@ -107,8 +107,9 @@ def _listed(path: Path, folder: Path) -> FoundFile:
     # The readers of foreign formats raise whatever their parser stumbles on.
     except Exception as error:
         said = " ".join(str(error).removeprefix(f"{path}: ").split())
-        # What says which library to install is not to be cut off.
-        return FoundFile(name, problem=escaped(said[:400]) or type(error).__name__)
+        if isinstance(error, MissingLibraryError):
+            return FoundFile(name, problem=escaped(said), lacks_library=True)
+        return FoundFile(name, problem=escaped(said[:160]) or type(error).__name__)
     return FoundFile(name, columns, "" if columns else "no table of numbers")
 
 
@@ -317,10 +318,9 @@ def _lacking(files: Sequence[FoundFile], signals: Sequence[FoundColumn]) -> int:
 
 def _no_signals(files: Sequence[FoundFile]) -> str:
     """What to say of a folder in which no file holds two signals."""
-    lacking = (one for one in files if "pip install" in one.problem)
-    first = next(lacking, None)
-    if first is not None:
-        return f"{escaped(first.name)}: {first.problem}"
+    for one in files:
+        if one.lacks_library:
+            return f"{escaped(one.name)}: {one.problem}"
     first = next((one for one in files if not one.problem), files[0])
     said = first.problem or _too_short(first.columns)
     said = said or "holds no two columns of the same table"

@@ -25,7 +25,7 @@ from hwid_cli.data.mdf_files import open_mdf
 from hwid_cli.data.npz_files import open_npz
 from hwid_cli.data.sheet_files import list_sheet_columns, read_sheet_columns
 from hwid_cli.data.tdms_files import open_tdms
-from hwid_cli.errors import MeasurementError
+from hwid_cli.errors import MeasurementError, MissingLibraryError
 from hwid_cli.files.isolated_process import (
     MOST_SECONDS,
     IsolatedReader,
@@ -297,7 +297,7 @@ def _importing(reader: Reader, path: Path) -> Iterator[None]:
     except ImportError as error:
         if not reader.needs:
             raise
-        raise MeasurementError(
+        raise MissingLibraryError(
             f"{path}: is read by {reader.needs}, which is missing ({error}); expected it "
             f"to be installed; run: pip install 'hwid[formats]' (or {reader.needs} alone), "
             "or convert the file"

@@ -60,10 +60,19 @@ def read_sheet_columns(
         role: key for role in roles if (key := getattr(columns, role)) is not None
     }
     texts = [key for key in wanted.values() if isinstance(key, str)]
-    if tables := _asked_long_tables(path, columns.variable, texts):
+    names = _names(path)
+    is_sheet = columns.variable in names
+    sheets = _asked(path, columns.variable if is_sheet else None)
+    tables = _long_tables(path, sheets, texts, is_named=is_sheet or len(sheets) > 1)
+    if tables:
         yield from pick_from_long(str(path), columns, tables, roles)
         return
-    name, rows = _sheet_of(path, columns.variable)
+    if columns.variable is not None and not is_sheet:
+        raise MeasurementError(
+            f"{path}: has no sheet {columns.variable!r} for recordings.columns.variable; "
+            f"{did_you_mean(columns.variable, names)}"
+        )
+    name, rows = next(iter(sheets.items()))
     head = read_head(_as_texts(rows[:_HEAD_ROWS]), wanted=texts)
     if head.body == min(len(rows), _HEAD_ROWS):
         raise MeasurementError(
@@ -103,16 +112,6 @@ def list_sheet_columns(path: Path) -> Iterator[FoundColumn]:
         found[name] = (_read_body(path, rows, head, titles), head)
     for name, (read, head) in found.items():
         yield from found_columns(read, head, variable=name if len(found) > 1 else None)
-
-
-def _asked_long_tables(
-    path: Path, name: str | None, wanted: Sequence[str]
-) -> tuple[LongTable, ...]:
-    """Long tables of the sheet that is asked for, else of all; none in a wide sheet."""
-    if name is not None and name in _names(path):
-        return _long_tables(path, {name: _rows(path, name)}, wanted, is_named=True)
-    sheets = _tables(path)
-    return _long_tables(path, sheets, wanted, is_named=len(sheets) > 1)
 
 
 def _long_tables(
@@ -184,19 +183,11 @@ def _mostly(flags: Iterator[bool]) -> bool:
     return 2 * sum(known) > len(known)
 
 
-def _sheet_of(path: Path, name: str | None) -> tuple[str, list[list[Any]]]:
-    """The sheet that is asked for, else the first one that holds numbers."""
-    names = _names(path)
-    if name is not None and name not in names:
-        raise MeasurementError(
-            f"{path}: has no sheet {name!r} for recordings.columns.variable; "
-            f"{did_you_mean(name, names)}"
-        )
-    if name is not None:
-        return name, _rows(path, name)
-    tables = _tables(path)
-    if tables:
-        return next(iter(tables.items()))
+def _asked(path: Path, name: str | None) -> dict[str, list[list[Any]]]:
+    """The sheet that is asked for, else all that hold numbers."""
+    found = _tables(path) if name is None else {name: _rows(path, name)}
+    if found:
+        return found
     raise MeasurementError(
         f"{path}: holds no sheet with numbers; expected one; export the measurement "
         "again or leave the file out"

@@ -91,6 +91,9 @@ from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.own_effects import own_ids
 from hwid_cli.records.recordings import Recording
 
+# Searches that may follow each other: the first, one beside a better base or a held
+# command, and one behind the filter for noise of the input.
+MOST_SEARCHES = 3
 _BEHIND_INPUT = (
     "compared is the output behind the logged input: in the controller's command hardly "
     "anything of this shows"

@@ -21,7 +21,7 @@ from hwid_cli.diagnosis.innovations import (
 )
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.drive.linear import has_inner_states, linear_equations
-from hwid_cli.drive.springs import stiffness_at
+from hwid_cli.drive.springs import stiffness_with_effects
 from hwid_cli.records.drive import HELD, Drive
 
 # Springs that differ along a motion by less than this share of their mean are one.
@@ -295,7 +295,7 @@ def noisy_drives(
     found: list[NoisyDrive] = []
     for drive, one in zip(drives, signals, strict=True):
         position = one.position if are_whole else one.position[one.evaluated]
-        stiffness = stiffness_at(drive, position)
+        stiffness = stiffness_with_effects(drive, position)
         mean = float(np.mean(stiffness))
         is_curved = np.ptp(stiffness) > _ONE_SPRING * abs(mean)
         if is_curved and not has_inner_states(drive):

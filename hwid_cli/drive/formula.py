@@ -346,10 +346,13 @@ _BENT = (*_JUMPING, "abs", "Max", "Min")
 
 def edges(node: Node) -> tuple[bool, bool]:
     """Whether a force jumps, and whether it bends, other than where the motion turns."""
-    at = [
-        one.name for one in node.walk() if one.name in _BENT and not names(one) <= {"v"}
-    ]
-    return any(one in _JUMPING for one in at), bool(at)
+    at = _edged(node)
+    return any(one.name in _JUMPING for one in at), bool(at)
+
+
+def _edged(node: Node) -> list[Node]:
+    """Parts that jump or bend other than where the motion turns."""
+    return [one for one in node.walk() if one.name in _BENT and not names(one) <= {"v"}]
 
 
 def jumps_along(node: Node) -> Node | None:
@@ -368,9 +371,7 @@ def jumps_along(node: Node) -> Node | None:
     Node or None
         None where nothing jumps, or something does with other variables than the position.
     """
-    jumping = [
-        one for one in node.walk() if one.name in _JUMPING and not names(one) <= {"v"}
-    ]
+    jumping = [one for one in _edged(node) if one.name in _JUMPING]
     if not jumping or any(names(one) != {"x"} for one in jumping):
         return None
     counted = {one.parts[0]: Node("sign", parts=one.parts) for one in jumping}

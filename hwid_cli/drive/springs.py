@@ -15,19 +15,28 @@ _APART = 1e-5
 
 
 def stiffness_at(drive: Drive, position: np.ndarray) -> np.ndarray:
-    """Slope of the spring's force at each place, [N/m].
+    """Slope of the force of the base's spring at each place, [N/m].
 
-    Effects of the drive that go with the position alone are part of it: magnets, a
-    weight, stops.
+    Parameters
+    ----------
+    position : ndarray, shape (n,), [m]
+    """
+    quadratic, cubic = _bends(drive)
+    bend = 2 * quadratic + 3 * cubic * position
+    return np.asarray(drive.stiffness_N_per_m + bend * position)
+
+
+def stiffness_with_effects(drive: Drive, position: np.ndarray) -> np.ndarray:
+    """Slope of all that depends on the position alone, at each place, [N/m].
+
+    The base's spring with the magnets, the weight and the stops that the drive has.
 
     Parameters
     ----------
     position : ndarray, shape (n,), [m]
     """
     if not drive_effects(drive):
-        quadratic, cubic = _bends(drive)
-        bend = 2 * quadratic + 3 * cubic * position
-        return np.asarray(drive.stiffness_N_per_m + bend * position)
+        return stiffness_at(drive, position)
     vector = parameter_vector(drive, drive_effects(drive))
     places = np.ascontiguousarray(position, dtype=np.float64)
     return _slopes(places, _APART * drive.reference_displacement_m, vector)

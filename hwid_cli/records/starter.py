@@ -50,11 +50,14 @@ class FoundFile:
         Long ones first come as they stand in the file; single numbers are among them.
     problem : str
         Why nothing was found; empty if something was.
+    lacks_library : bool
+        Whether it is that a library is not installed: it may be a measurement.
     """
 
     name: str
     columns: tuple[FoundColumn, ...] = ()
     problem: str = ""
+    lacks_library: bool = False
 
 
 @dataclass(frozen=True)

@@ -597,7 +597,9 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         n,
         given.options.max_effects,
         planning.workers,
-        searches=MOST_SEARCHES,
+        searches=pipeline.MOST_SEARCHES
+        if isinstance(given.simulation, SimulationOptions)
+        else MOST_SEARCHES,
         may_be_law=given.options.laws != "never",
     )
     what = f"{counted(n, 'recording')} x {counted(found.n_tasks, 'effect')}"

@@ -143,5 +143,5 @@ def test_a_library_that_is_missing_is_named_before_a_note_beside_the_files():
     )
     note = FoundFile("NOTES.txt", (FoundColumn("m", "m", np.arange(3.0)),))
     with pytest.raises(MeasurementError, match=r"^run\.xlsx: .*pip install") as told:
-        guess_layout([note, FoundFile("run.xlsx", (), lacks)])
+        guess_layout([note, FoundFile("run.xlsx", (), lacks, lacks_library=True)])
     assert str(told.value).endswith("'hwid[formats]'")
