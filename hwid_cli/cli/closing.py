@@ -12,6 +12,7 @@ from hwid_cli.records.report import StoredResults
 from hwid_cli.report.closing import (
     LINEAR_KEYS,
     UNDECIDED_MAPS,
+    above_threshold_hint,
     best_model_sentences,
     closing_text,
     diagnosis_sentence,
@@ -61,10 +62,10 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
     if best is not None:
         rows += [("best model", one) for one in best_model_sentences(best)]
     advice = session.results.get("order")
-    if advice is not None and name == _RUN:
+    if advice is not None and name in (_RUN, "order"):
         asks_for_maps = best is None or (best.is_usable and not best.own_maps)
         maps = advice.maps if asks_for_maps else None
-        rows.append(("orders", orders_sentence(advice.orders, maps)))
+        rows.append(("orders", orders_sentence(advice.orders, maps, best)))
     if diagnosis is not None:
         rows.append(("simulation", diagnosis_sentence(diagnosis)))
         rows += [("warning", one) for one in diagnosis.warnings[:_MOST_WARNINGS]]
@@ -115,8 +116,15 @@ def _hints(session: Session, best: BestModel, name: str) -> list[tuple[str, str]
         return [("hint", nothing_hint(str(experiment.source)))]
     if best.is_linear_better:
         return _better_maps(session, name)
-    if experiment.group is not None or not best.rmsd >= best.threshold:
+    if not best.rmsd >= best.threshold:
         return []
+    if experiment.group is not None:
+        text = above_threshold_hint(
+            str(experiment.source),
+            has_order="order" in session.results,
+            has_next=experiment.next is not None,
+        )
+        return [("hint", text)]
     text = (
         "a model of several recordings may cover more: add 'group: {}' to "
         f"{experiment.source} and run it again"
@@ -166,11 +174,21 @@ def _next(session: Session, name: str, best: BestModel | None) -> str:
         return command_line(session, follows)
     if best is not None and not best.is_usable:
         return command_line(session, "check")
-    if best is not None and best.is_linear_better:
-        return command_line(session, "export", "--model", best.linear_name)
     if best is not None:
-        return command_line(session, "export", "--model", best.name)
+        return _after_model(session, best)
     return command_line(session, "run" if name != _RUN else "identify")
+
+
+def _after_model(session: Session, best: BestModel) -> str:
+    """Take the model elsewhere, unless something may still make it good enough."""
+    results = session.results
+    if not best.is_linear_better and best.rmsd >= best.threshold:
+        if "order" not in results:
+            return command_line(session, "order")
+        if session.experiment.next is not None and "next" not in results:
+            return command_line(session, "next")
+    name = best.linear_name if best.is_linear_better else best.name
+    return command_line(session, "export", "--model", name)
 
 
 def _after_diagnosis(session: Session, diagnosis: Diagnosis) -> str:

@@ -26,6 +26,7 @@ from hwid_cli.data.column_clocks import (
 )
 from hwid_cli.data.column_roles import SignalGuess, guess_signals
 from hwid_cli.data.column_words import counts_recordings, meaning_of
+from hwid_cli.data.conditions import condition_notes
 from hwid_cli.data.formats import SUFFIXES, list_columns, reader_of
 from hwid_cli.data.header_stamps import topic_of
 from hwid_cli.data.recording_files import PLAN_NAME
@@ -255,6 +256,8 @@ def _layout_of_alike(
     there = {role: one for role, one in roles.items() if one is not None}
     used, left = _sorted_out(files, there, typical)
     layout = _layout(signals, clocks, (_patterns(used, files), left))
+    conditions = condition_notes(used, {one.place for one in there.values()})
+    layout = replace(layout, notes=(*layout.notes, *conditions))
     layout = _in_parts(layout, used, there.get("time"))
     layout = _with_lost_samples(layout, used, there.get("time"))
     if layout.variable == STAR:

@@ -14,6 +14,9 @@ from hwid_cli.model.damaged_samples import find_damaged
 _HOLDS = 0.5
 # Fewest samples in a row at the largest or smallest value that are no coincidence, [-].
 _LIMIT_RUN = 5
+# A rounded peak takes as long through so many steps below its last one; the share by which
+# noise and samples may lengthen its stay there, [-].
+_STEPS_BESIDE, _PARABOLA = 3, 1.5
 # A signal that is cut at its limits for most of the time is between them for this share
 # at least, leaves a limit so often, and bends by more than this share of its range from
 # sample to sample, [-].
@@ -51,7 +54,7 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
         for word, limit in (("largest", values.max()), ("smallest", values.min())):
             # A rest before the motion is no limit of the sensor.
             at_limit = (values == limit) & (np.cumsum(values != values[0]) > 0)
-            if longest_run(at_limit) >= _LIMIT_RUN:
+            if longest_run(at_limit) >= _LIMIT_RUN and _ends_abruptly(values, limit):
                 share = 100.0 * float(np.mean(at_limit))
                 notes.append(
                     f"at its {word} value {limit:.4g} for {share:.2g} % of the time: "
@@ -79,6 +82,24 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
         what = "sample looks" if damaged == 1 else "samples look"
         notes.append(f"{damaged} {what} damaged")
     return tuple(notes)
+
+
+def _ends_abruptly(values: np.ndarray, limit: float) -> bool:
+    """Whether a signal meets its limit at full speed, not as a peak that is rounded.
+
+    A peak is a parabola. Rounded to steps it stays on the last one at most for as long as
+    it takes through the three before it, up and down together.
+    """
+    step = float(np.min(np.diff(np.unique(values))))
+    at_limit = np.concatenate([[False], values == limit, [False]])
+    is_near = np.abs(values - limit) < (_STEPS_BESIDE + 0.5) * step
+    edges = np.flatnonzero(np.diff(at_limit.astype(int)))
+    begins, ends = edges[::2], edges[1::2]
+    longest = int(np.argmax(ends - begins))
+    begin, end = int(begins[longest]), int(ends[longest])
+    before = np.argmin(np.concatenate([is_near[:begin][::-1], [False]]))
+    behind = np.argmin(np.concatenate([is_near[end:], [False]]))
+    return bool(end - begin > _PARABOLA * (before + behind + 1))
 
 
 def _count_wraps(values: np.ndarray) -> int:

@@ -357,6 +357,29 @@ def cut_part(columns: FileColumns, part: FilePart) -> FileColumns:
     return with_each(columns, lambda column: keep_rows(column, selection))
 
 
+def _is_named(pattern: str, path: Path, name: str) -> bool:
+    """Whether a pattern is on a recording's name, or on its file's without the ending."""
+    return any(fnmatchcase(one, pattern) for one in (name or path.stem, path.stem))
+
+
+def unmatched_kinds(
+    parts: Sequence[FilePart], patterns: Mapping[str, tuple[str, ...]]
+) -> list[tuple[str, str]]:
+    """Kinds with those of their patterns that no recording has.
+
+    Returns
+    -------
+    list of (str, str)
+        Kind and pattern.
+    """
+    return [
+        (kind, pattern)
+        for kind, of_kind in patterns.items()
+        for pattern in of_kind
+        if not any(_is_named(pattern, one.path, one.name) for one in parts)
+    ]
+
+
 def kind_of(
     path: Path,
     patterns: Mapping[str, tuple[str, ...]],
@@ -386,11 +409,10 @@ def kind_of(
     MeasurementError
         If patterns of two kinds match.
     """
-    names = {name or path.stem, path.stem}
     matching = [
         kind
         for kind, of_kind in patterns.items()
-        if any(fnmatchcase(one, pattern) for pattern in of_kind for one in names)
+        if any(_is_named(pattern, path, name) for pattern in of_kind)
     ]
     if len(matching) > 1:
         raise MeasurementError(

@@ -30,6 +30,7 @@ from hwid_cli.data.recording_files import (
     read_plan,
     recordings_base,
     recordings_options,
+    unmatched_kinds,
 )
 from hwid_cli.data.sampling import missing_samples, sample_uniformly
 from hwid_cli.data.signal_units import (
@@ -81,6 +82,7 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
     by_path = _by_path(paths, options)
     parts = [part for path in paths for part in by_path[path]]
     checks.check_names([(part.path, part.name) for part in parts])
+    _warn_of_unused_kinds(parts, experiment.source, options)
     plans = {folder: read_plan(folder) for folder in {path.parent for path in paths}}
     recordings = []
     for path in paths:
@@ -94,7 +96,6 @@ def read_recordings(experiment: Experiment, out: Path) -> list[RawRecording]:
         for part in by_path[path]:
             raw = _read_part(part, columns[part.table], plans[path.parent], experiment)
             recordings.append(replace(raw, sha256=digest))
-    _warn_of_unused_kinds(recordings, experiment.source, options)
     recordings.sort(key=lambda recording: KINDS.index(recording.kind))
     checks.check_sample_times(recordings, options.sampling_tolerance)
     checks.check_units(recordings)
@@ -258,16 +259,18 @@ def file_sha256(path: Path) -> str:
 
 
 def _warn_of_unused_kinds(
-    recordings: list[RawRecording], source: str, options: RecordingsOptions
+    parts: Sequence[FilePart], source: str, options: RecordingsOptions
 ) -> None:
-    for kind in options.kind:
-        if kind not in {recording.kind for recording in recordings}:
-            _log.warning(
-                "%s: recordings.kind.%s: %s matches no file; its recipe is not used",
-                source,
-                kind,
-                " or ".join(repr(pattern) for pattern in options.kind[kind]),
-            )
+    """Say which patterns are on no recording: those that were meant have another recipe."""
+    for kind, pattern in unmatched_kinds(parts, options.kind):
+        _log.warning(
+            "%s: recordings.kind.%s: %r matches no recording; expected a pattern on a "
+            "recording's name, such as %r",
+            source,
+            kind,
+            pattern,
+            parts[0].name,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,6 +318,8 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
     parts = [part for path in paths for part in by_path.get(path, [])]
     with _noting(problems):
         checks.check_names([(part.path, part.name) for part in parts])
+    if parts:
+        _warn_of_unused_kinds(parts, experiment.source, options)
     read: list[RawRecording] = []
     short: list[checks.ShortRecordingError] = []
     jitter: dict[str, float] = {}

@@ -71,6 +71,13 @@ class ModelAnswer:
         Recommended maps; None where nobody has compared any at the recommended orders.
     has_these_maps : bool
         Whether the model has the recommended maps.
+    own_maps : tuple of (str, int)
+        Kind and units of its maps where they were chosen for it alone; empty else.
+    place : tuple of int, [-]
+        Its place in the order grid.
+    held : tuple of (str, float)
+        Recordings that nothing has used, and the share of each that its band of 90 %
+        holds, [-]; empty where there is no band.
     advised_rmsd : float, [unit]
         Mean over ``recordings`` of the model of the same recordings at the recommended
         orders; NaN where there is none.
@@ -100,6 +107,9 @@ class ModelAnswer:
     advice: OrderChoice | None = None
     maps: ChosenMaps | None = None
     has_these_maps: bool = True
+    own_maps: tuple[tuple[str, int], ...] = ()
+    place: tuple[int, int] = (0, 0)
+    held: tuple[tuple[str, float], ...] = ()
     advised_rmsd: float = float("nan")
     advised_name: str = ""
     noise_rms: float = float("nan")
@@ -126,6 +136,11 @@ class ModelAnswer:
         return is_linear_preferred(
             self.mean_rmsd, self.linear_mean_rmsd, self.rmsd.size, self.linear_ratio
         )
+
+    @property
+    def is_above_threshold(self) -> bool:
+        """Whether its mean RMSD where it was not fitted is not accepted."""
+        return bool(self.mean_rmsd >= self.threshold)
 
     @property
     def is_usable(self) -> bool:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from math import isfinite
 
+from hwid_cli.records.groups import SingleModels
+
 # In front of a model's name: the linear one of these orders and recordings.
 LINEAR = "linear:"
 # What judged a model, the strictest first: recordings that nothing has used; recordings
@@ -54,11 +56,9 @@ class BestModel:
         Largest RMSD that is accepted.
     chosen_on : tuple of str
         Recordings that chose it among others; empty where its own fit did.
-    single : str
-        Of a group: the best model of a single recording, told without ``judged_on``;
-        empty where there is none.
-    single_rmsd : float, [unit]
-        Its mean over the same recordings.
+    singles : SingleModels or None
+        Of a group: models of single recordings on the same recordings; None where there
+        is none.
     fit_percent, linear_fit_percent : float, [%]
         Medians over ``judged_on`` of the model and of the linear one; NaN where that is
         not known.
@@ -70,6 +70,9 @@ class BestModel:
     has_estimated_starts : bool
         Whether each simulation started from a state that its measured output told: a
         prediction has none.
+    held : tuple of (str, float)
+        Recordings that nothing has used, and the share of each that the model's band of
+        90 % holds, [-]; empty where there is no band.
     own_maps : tuple of (str, int)
         Kind and units of its maps, input and output, where it was given others than the
         configuration's; empty else. No units where a kind has none.
@@ -83,13 +86,13 @@ class BestModel:
     threshold: float
     chosen_on: tuple[str, ...] = ()
     linear_rmsd: float = float("nan")
-    single: str = ""
-    single_rmsd: float = float("nan")
+    singles: SingleModels | None = None
     fit_percent: float = float("nan")
     linear_fit_percent: float = float("nan")
     linear_name: str = ""
     linear_ratio: float = float("nan")
     has_estimated_starts: bool = False
+    held: tuple[tuple[str, float], ...] = ()
     own_maps: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
@@ -100,6 +103,12 @@ class BestModel:
     def is_accepted(self) -> bool:
         """Whether its mean RMSD lies below the threshold."""
         return self.rmsd < self.threshold
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Its place in the order grid, [-]."""
+        _, nb, nk = self.name.rsplit("/", 2)
+        return int(nb), int(nk)
 
     @property
     def is_linear_better(self) -> bool:

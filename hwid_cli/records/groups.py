@@ -324,6 +324,26 @@ class FinalTest(Shown):
         )
 
 
+@dataclass(frozen=True)
+class SingleModels:
+    """Models of single recordings that stand beside one of several, on test recordings.
+
+    Parameters
+    ----------
+    chosen : str
+        Chosen as the group is, without a look at the test recordings.
+    nearest : str
+        The one that comes closest there; only these recordings could choose it.
+    chosen_rmsd, nearest_rmsd : float, [output unit]
+        Means over the test recordings.
+    """
+
+    chosen: str
+    chosen_rmsd: float
+    nearest: str
+    nearest_rmsd: float
+
+
 @dataclass(frozen=True, eq=False)
 class ChainTrend:
     """What happens along the chain of groups.
@@ -338,19 +358,15 @@ class ChainTrend:
         Kinds of recordings, in the order of the recordings.
     coverage : ndarray of int, shape (n, k), [-]
         Recordings of each kind below the threshold, a model's own ones included.
-    best_single : str
-        Of the models of single recordings the best on recordings that are neither its
-        own nor for the test; empty where there is none.
-    single_rmsd : float, [output unit]
-        Its mean RMSD over the test recordings.
+    singles : SingleModels or None
+        Models of single recordings on the test recordings; None where there is none.
     """
 
     models: tuple[str, ...]
     tested_rmsd: tuple[float, ...]
     kinds: tuple[str, ...]
     coverage: np.ndarray
-    best_single: str = ""
-    single_rmsd: float = float("nan")
+    singles: SingleModels | None = None
 
     @property
     def total(self) -> tuple[int, ...]:

@@ -10,7 +10,8 @@ from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.next import NextRecordings
 from hwid_cli.records.order import MapAdvice, OrderAdvice
-from hwid_cli.report.formats import counted, listed, with_unit
+from hwid_cli.report.final_test import joining_sentence
+from hwid_cli.report.formats import counted, listed, share_text, with_unit
 from hwid_cli.report.map_words import fit_keys, map_words
 from hwid_cli.report.orders import axes_to_widen, delay_keys
 
@@ -19,6 +20,8 @@ _LABELS = 12
 _FEW = 3
 # Share of the RMSD of the maps below which a linear model is better, not as good.
 _CLEARLY = 0.9
+# A band of 90 % that holds less than this on average is too narrow to rely on, [-].
+_LEAST_HELD = 0.75
 # Keys of the configuration that ask for linear models.
 LINEAR_KEYS = "input_map: none, output_map: none"
 # Rows that people copy: a line break would spoil them.
@@ -94,6 +97,12 @@ def best_model_sentences(best: BestModel) -> list[str]:
     if best.own_maps:
         maps = " and ".join(map_words(*one) for one in best.own_maps)
         said.append(f"its maps, {maps}, come closest to recordings left out in turn")
+    return [*said, *_beside(best)]
+
+
+def _beside(best: BestModel) -> list[str]:
+    """What stands beside a model: the linear one, single ones, how far its band holds."""
+    said = []
     if np.isfinite(best.linear_rmsd):
         linear = with_unit(best.linear_rmsd, best.unit)
         said.append(f"{_linear_model(best)}: {linear}")
@@ -103,11 +112,44 @@ def best_model_sentences(best: BestModel) -> list[str]:
                 f"; over all recordings but its own {best.name} leaves "
                 f"{best.linear_ratio:.2g} times as much as that"
             )
-    if best.single and np.isfinite(best.single_rmsd):
-        helps = "helps" if best.rmsd < best.single_rmsd else "does not help"
-        single = with_unit(best.single_rmsd, best.unit)
-        said.append(f"joining recordings {helps} here: {best.single} alone {single}")
+    if best.singles is not None:
+        joining = joining_sentence(best.rmsd, best.singles, best.unit)
+        said += [one[:1].lower() + one[1:].rstrip(".") for one in joining]
+    if narrow := narrow_band_sentence(best.held):
+        said.append(narrow)
     return said
+
+
+def narrow_band_sentence(held: Sequence[tuple[str, float]]) -> str:
+    """Warn where a band of 90 % holds far less on recordings that nothing has used.
+
+    Parameters
+    ----------
+    held : sequence of (str, float)
+        Recordings, and the share of each that the band holds, [-].
+
+    Returns
+    -------
+    str
+        Empty where it holds enough, or there is no band.
+
+    Examples
+    --------
+    >>> print(*narrow_band_sentence([("a", 0.59), ("b", 0.8)]).split())
+    do not rely on its band of 90 %: it holds 70 % of the recordings never used, 59 % of a
+    """
+    if not held:
+        return ""
+    mean = float(np.mean([share for _, share in held]))
+    if mean >= _LEAST_HELD:
+        return ""
+    name, least = min(held, key=lambda one: one[1])
+    worst = "" if len(held) == 1 else f", {share_text(least)} of {name}"
+    what = f"of {name}" if len(held) == 1 else "of the recordings never used"
+    return (
+        f"do not rely on its band of 90\N{NO-BREAK SPACE}%: it holds {share_text(mean)} "
+        f"{what}{worst}"
+    )
 
 
 def _linear_model(best: BestModel) -> str:
@@ -185,8 +227,34 @@ def _judged(rmsd: float, on: str, best: BestModel) -> str:
     return f"{written} on {on}; {side} the {limit} of crossval.threshold{by}"
 
 
-def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
-    """Recommended orders, and maps where some were compared."""
+def why_other_orders(name: str, own: tuple[int, int], advised: tuple[int, int]) -> str:
+    """Say why a model does not have the recommended orders; empty where it has them.
+
+    Parameters
+    ----------
+    name : str
+        Of the model, as the reader knows it.
+    own, advised : tuple of int, [-]
+        Places in the order grid.
+    """
+    if own == advised:
+        return ""
+    return (
+        f"{name} has {own[0]}/{own[1]}: it is chosen as one model, by recordings beside its "
+        "own; these orders do well on average over the models of all recordings"
+    )
+
+
+def orders_sentence(
+    orders: OrderAdvice, maps: MapAdvice | None, best: BestModel | None = None
+) -> str:
+    """Recommended orders, and maps where some were compared.
+
+    Parameters
+    ----------
+    best : BestModel or None
+        The model that stands beside them.
+    """
     said = f"nb = {orders.overall.nb}, nk = {orders.overall.nk}"
     if maps is not None:
         pair = (maps.chosen.input_map, maps.chosen.output_map)
@@ -203,6 +271,10 @@ def orders_sentence(orders: OrderAdvice, maps: MapAdvice | None) -> str:
         )
     elif axes:
         said += f"; they lie at the edge of the grid: widen {' and '.join(axes)}"
+    if best is not None and best.is_usable and not best.is_linear_better:
+        advised = (orders.overall.nb, orders.overall.nk)
+        if why := why_other_orders("the model above", best.place, advised):
+            said += f"; {why}"
     return said
 
 
@@ -227,6 +299,29 @@ UNDECIDED_MAPS = (
     "'hwid order' prefers these maps, the recordings that judge a linear model: let more "
     "recordings judge (test.recordings)"
 )
+
+
+# What a configuration needs so that 'hwid next' can propose recordings.
+NEXT_KEYS = "next: {limits: {amplitude: ..., rate: ..., duration_s: ...}}"
+
+
+def above_threshold_hint(source: str, *, has_order: bool, has_next: bool) -> str:
+    """Say what may bring a model below the threshold.
+
+    Parameters
+    ----------
+    has_order : bool
+        Whether orders and maps have been compared already.
+    has_next : bool
+        Whether the configuration says what could be recorded.
+    """
+    steps = [] if has_order else ["hwid order compares orders and maps"]
+    asks = "hwid next" if has_next else f"hwid next, with '{NEXT_KEYS}' in {source},"
+    steps.append(f"{asks} says which recordings are missing")
+    return (
+        f"above the threshold: {'; '.join(steps)}; an effect that no map can hold shows in "
+        "hwid diagnose"
+    )
 
 
 def keys_hint(keys: str, source: str) -> str:

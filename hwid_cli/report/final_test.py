@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from hwid_cli.records.groups import ChainTrend, FinalTest, Prediction
+from hwid_cli.records.groups import ChainTrend, FinalTest, Prediction, SingleModels
 from hwid_cli.records.units import behind
-from hwid_cli.report.formats import MISSING, counted, decimals, number
+from hwid_cli.report.formats import MISSING, counted, decimals, number, with_unit
 from hwid_cli.report.table import Cell, Column, Row, Table, Text, numbers, texts
 
 # Published tables of the chain on all recordings of a kind.
@@ -27,16 +27,17 @@ def chain_on_tests_table(final: FinalTest, trend: ChainTrend) -> Table:
     """
     last = list(map(number, trend.tested_rmsd))
     rows = _chain_rows(final, final.tested_on, last)
-    if trend.best_single and trend.best_single not in final.chain:
-        alone = replace(final, chain=(trend.best_single,))
-        mean = [number(trend.single_rmsd)]
+    singles = trend.singles
+    if singles is not None and singles.chosen not in final.chain:
+        alone = replace(final, chain=(singles.chosen,))
+        mean = [number(singles.chosen_rmsd)]
         rows = (*_chain_rows(alone, final.tested_on, mean), *rows)
     return Table(
         f"The chain on the test recordings: RMSD [{final.unit}], * below "
         f"{final.threshold:g}",
         _chain_columns(final.tested_on, "mean"),
         rows,
-        (trend_sentence(trend), *joining_sentence(trend)),
+        (trend_sentence(trend), *_joining_note(final, trend)),
         is_validation=True,
         published="T3.3.3.4-1",
     )
@@ -65,30 +66,48 @@ def trend_sentence(trend: ChainTrend) -> str:
     return f"{start} does not fall."
 
 
-def joining_sentence(trend: ChainTrend) -> tuple[str, ...]:
+def _joining_note(final: FinalTest, trend: ChainTrend) -> tuple[str, ...]:
+    """Whether joining recordings helped; empty where the winner is no group."""
+    if trend.singles is None or not trend.models or "+" not in trend.models[-1]:
+        return ()
+    return joining_sentence(trend.tested_rmsd[-1], trend.singles, final.unit)
+
+
+def joining_sentence(rmsd: float, singles: SingleModels, unit: str) -> tuple[str, ...]:
     """Say whether joining recordings helped on those that nothing has used.
+
+    Parameters
+    ----------
+    rmsd : float, [unit]
+        Of the joined model, mean over these recordings.
 
     Returns
     -------
     tuple of str
-        Empty where the winner is no group, or there is no single model beside it.
+        Empty where one of both RMSDs is not known.
 
     Examples
     --------
-    >>> trend = ChainTrend(("a/1/1", "a+b/1/1"), (0.3, 0.1), ("step",), np.ones((2, 1)))
-    >>> joining_sentence(replace(trend, best_single="b/1/2", single_rmsd=0.2))[0]
-    'Joining helps here: 0.1 on average, the best single model, b/1/2, 0.2.'
+    >>> said = joining_sentence(0.1, SingleModels("b/1/2", 0.2, "b/1/2", 0.2), "m")
+    >>> print(*said[0].split())
+    Joining recordings helps here: b/1/2, the single model chosen in the same way, leaves 0.2 m.
     """
-    if not trend.models or "+" not in trend.models[-1] or not trend.best_single:
+    if not (np.isfinite(rmsd) and np.isfinite(singles.chosen_rmsd)):
         return ()
-    group, single = trend.tested_rmsd[-1], trend.single_rmsd
-    if not (np.isfinite(group) and np.isfinite(single)):
-        return ()
-    says = "helps here" if group < single else "does not help here"
-    return (
-        f"Joining {says}: {group:.3g} on average, the best single model, "
-        f"{trend.best_single}, {single:.3g}.",
+    helps = "helps" if rmsd < singles.chosen_rmsd else "does not help"
+    chosen, nearest = (
+        with_unit(one, unit) for one in (singles.chosen_rmsd, singles.nearest_rmsd)
     )
+    said = (
+        f"Joining recordings {helps} here: {singles.chosen}, the single model chosen in "
+        f"the same way, leaves {chosen}"
+    )
+    if singles.nearest_rmsd < min(rmsd, singles.chosen_rmsd):
+        said += (
+            f"; {singles.nearest} happens to be nearer, {nearest}, which only the test "
+            "recordings can tell"
+        )
+    return (f"{said}.",)
 
 
 def chain_coverage_table(

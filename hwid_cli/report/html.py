@@ -11,7 +11,7 @@ import hashlib
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from importlib.resources import files
 from importlib.util import find_spec
@@ -24,7 +24,7 @@ from markupsafe import Markup, escape
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.charts import chart_data
 from hwid_cli.report.dots import dot_drawing
-from hwid_cli.report.page import Answer, Drawing, Section
+from hwid_cli.report.page import Answer, Drawing, Section, to_copy
 from hwid_cli.report.sections.about import about_section
 from hwid_cli.report.sections.summary import summary_section
 from hwid_cli.report.table import shown_part
@@ -92,6 +92,7 @@ def _html(contents: ReportContents, sections: Iterable[Section]) -> str:
     )
     environment.filters["chart_data"] = chart_data
     environment.filters["soft"] = soft
+    environment.filters["to_copy"] = partial(to_copy, stored=contents.stored)
     environment.filters["laid_out"] = dot_drawing
     environment.filters["shown"] = lambda table: shown_part(
         table, is_screen=False, thesis_names=contents.stored.thesis_names

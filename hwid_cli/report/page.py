@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from hwid_cli.records.report import ReportContents
+from hwid_cli.records.report import ReportContents, StoredResults
 from hwid_cli.report.charts import Chart
 from hwid_cli.report.dots import Dots
 from hwid_cli.report.formats import listed
@@ -223,6 +223,18 @@ def marked_if_changed(
             *answer.next_steps,
         ),
     )
+
+
+def to_copy(command: str, stored: StoredResults) -> str:
+    """Write a command with the configuration that the page is of.
+
+    Examples
+    --------
+    >>> stored = StoredResults("a", "{}", "poles", arguments="a.yaml --out b")
+    >>> to_copy("hwid export CONFIG --diagnosis", stored)
+    'hwid export a.yaml --out b --diagnosis'
+    """
+    return command.replace("CONFIG", stored.arguments)
 
 
 def collapsed_beyond(most: int, table: Table, summary: str) -> Table | Collapsible:

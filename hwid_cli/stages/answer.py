@@ -5,6 +5,7 @@ The choice never looks at the recordings of the final test: those say how good i
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from hwid_cli.records.order import OrderChoice
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import StoredResults
 from hwid_cli.records.results import CrossValidation
-from hwid_cli.stages.best_model import best_model
+from hwid_cli.stages.best_model import best_model, held_by
 from hwid_cli.stages.identify import Run
 from hwid_cli.stages.linear_reference import Roles, linear_reference
 from hwid_cli.stages.model_views import named_fits
@@ -55,42 +56,50 @@ def model_answer(
     found = named[name]
     if found.model is None:
         return None
-    own = found.identified_on
     final = stored.final_test
-    unseen = _unseen(stored.recordings, own, final)
-    roles = Roles(chosen_on, tuple(one.name for one in unseen))
+    unseen = _unseen(stored.recordings, found.identified_on, final)
+    names = tuple(one.name for one in unseen)
+    roles = Roles(chosen_on, names)
     beside = linear_reference(
         found, fits.values(), stored.recordings, roles, run, nk_role=stored.nk_role
     )
     deviation, percent = _scores(found.model, unseen)
     linear = beside.fit.model if beside else None
     linear_deviation, linear_percent = _scores(linear, unseen)
-    maps, visited = _maps(stored, advice), _visited(found, stored.recordings)
     answer = ModelAnswer(
         name=name,
         model=found.model,
         linear=linear,
         linear_name=beside.name if beside else "",
         linear_ratio=beside.ratio if beside else np.nan,
-        own=own,
+        own=found.identified_on,
         chosen_on=chosen_on,
-        recordings=tuple(one.name for one in unseen),
+        recordings=names,
         is_unused=final is not None and bool(final.tested_on),
         rmsd=deviation,
         linear_rmsd=linear_deviation,
         fit_percent=percent,
         linear_fit_percent=linear_percent,
-        input_range=visited,
-        beyond=np.array([_beyond(visited, one) for one in unseen]),
+        **_reach(found, stored.recordings, unseen),
         unit=stored.recordings[0].output_unit,
         threshold=_threshold(crossval or final),
         advice=advice,
-        maps=maps,
-        has_these_maps=bool(own_maps(found, fits.values())) or _has_maps(found, maps),
+        place=grid_place(found, stored.nk_role),
+        held=() if final is None else held_by(name, final),
         noise_rms=differences_rms([one.output for one in unseen], 0.0) or np.nan,
     )
+    answer = _with_maps(answer, found, fits, _maps(stored, advice))
     name = _at(advice, found, named, stored.nk_role)
     return _with_advised(answer, name, named.get(name), unseen)
+
+
+def _with_maps(
+    answer: ModelAnswer, found: Fit, fits: Mapping[str, Fit], maps: ChosenMaps | None
+) -> ModelAnswer:
+    """The answer with the recommended maps beside those of its model."""
+    own = own_maps(found, fits.values())
+    has_them = bool(own) or _has_maps(found, maps)
+    return replace(answer, maps=maps, has_these_maps=has_them, own_maps=own)
 
 
 def _threshold(judged: CrossValidation | FinalTest | None) -> float:
@@ -204,6 +213,15 @@ def _scores(
     ]
     values = np.array(both).reshape(-1, 2)
     return values[:, 0], values[:, 1]
+
+
+def _reach(
+    found: Fit, recordings: Sequence[Recording], unseen: Sequence[Recording]
+) -> dict[str, Any]:
+    """What the input has visited in the fit, and how far others go beyond."""
+    visited = _visited(found, recordings)
+    beyond = np.array([_beyond(visited, one) for one in unseen])
+    return {"input_range": visited, "beyond": beyond}
 
 
 def _visited(found: Fit, recordings: Sequence[Recording]) -> tuple[float, float]:

@@ -22,7 +22,7 @@ from hwid_cli.stages.identify import Run
 from hwid_cli.stages.linear_reference import Roles, linear_reference
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import best_fits, widest_model
-from hwid_cli.stages.test import best_single, taken_model
+from hwid_cli.stages.test import single_models, taken_model
 from hwid_cli.stages.together import own_maps
 
 
@@ -75,11 +75,18 @@ def _tested(place: int, final: FinalTest) -> BestModel:
         final.unit,
         final.threshold,
         tuple(choosers.tolist()),
+        held=held_by(final.models[place], final),
     )
-    single = best_single(final)
-    if "+" not in found.name or single < 0:
+    if "+" not in found.name:
         return found
-    return replace(found, single=final.models[single], single_rmsd=float(mean[single]))
+    return replace(found, singles=single_models(final))
+
+
+def held_by(model: str, final: FinalTest) -> tuple[tuple[str, float], ...]:
+    """Test recordings, and the share of each that a model's band of 90 % holds, [-]."""
+    return tuple(
+        (one.recording, one.coverage) for one in final.trust.rows if one.model == model
+    )
 
 
 def _of_group(search: GroupSearch) -> BestModel:

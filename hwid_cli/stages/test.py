@@ -13,7 +13,7 @@ import numpy as np
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import Experiment, FinalTestOptions
-from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch
+from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch, SingleModels
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
@@ -277,7 +277,6 @@ def chain_trend(final: FinalTest, kinds: Mapping[str, str]) -> ChainTrend:
     of_recording = np.array([kinds[name] for name in final.recordings])
     present = tuple(dict.fromkeys(of_recording.tolist()))
     covered = rmsd < final.threshold
-    single = best_single(final)
     return ChainTrend(
         models=final.chain,
         tested_rmsd=tuple(np.mean(rmsd[:, is_tested], axis=1).tolist()),
@@ -285,10 +284,30 @@ def chain_trend(final: FinalTest, kinds: Mapping[str, str]) -> ChainTrend:
         coverage=np.array(
             [np.sum(covered[:, of_recording == kind], axis=1) for kind in present]
         ).T,
-        best_single="" if single < 0 else final.models[single],
-        single_rmsd=float("nan")
-        if single < 0
-        else float(np.mean(final.rmsd[single, is_tested])),
+        singles=single_models(final),
+    )
+
+
+def single_models(final: FinalTest) -> SingleModels | None:
+    """The models of single recordings beside a group; None where there is none.
+
+    The one that is nearest on the test recordings is there too: tables show it, and who
+    reads them asks why it was not chosen.
+    """
+    chosen = best_single(final)
+    if chosen < 0:
+        return None
+    is_tested = np.isin(final.recordings, final.tested_on)
+    mean = np.mean(final.rmsd[:, is_tested], axis=1)
+    singles = np.flatnonzero(final.is_own.sum(axis=1) == 1)
+    nearest = int(
+        min(singles, key=lambda place: np.nan_to_num(mean[place], nan=np.inf))
+    )
+    return SingleModels(
+        final.models[chosen],
+        float(mean[chosen]),
+        final.models[nearest],
+        float(mean[nearest]),
     )
 
 

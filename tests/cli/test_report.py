@@ -27,7 +27,7 @@ def test_without_results_it_says_in_one_line_what_to_run(hwid, out):
     assert not (out / "report.html").exists()
 
 
-def test_a_report_of_all_stages(after_run, hwid, out):
+def test_a_report_of_all_stages(after_run, hwid, config, out):
     before = (out / "results.h5").read_bytes()
     result = hwid("report")
 
@@ -41,7 +41,9 @@ def test_a_report_of_all_stages(after_run, hwid, out):
     names = json.loads(re.search(r"<!-- drawn from \w+ (\{.*\}) -->\n", html)[1])
     assert names
     assert set(names) <= set(figures)
-    assert "hwid group CONFIG" in html
+    # A command of the page is one to copy.
+    assert f"hwid group {config} --out {out}" in html
+    assert "CONFIG" not in re.sub(r"<(script|style).*?</\1>", "", html, flags=re.S)
     # Seconds and versions come from the results.
     row = re.search(r"<td class=\"text\">identify</td>(.*?)</tr>", html, re.DOTALL)
     assert re.search(r"<td>\d+\.\d</td>", row[1])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.data.quality import quality_notes
+from hwid_cli.data.quality import longest_run, quality_notes
 
 T = np.arange(1000) / 1000
 WAVE = np.sin(2 * np.pi * 3 * T) + 0.01 * np.random.default_rng(1).standard_normal(1000)
@@ -103,3 +103,13 @@ def test_levels_that_change_do_not_begin_again(noise):
     levels = np.repeat([0.0, 1.0, 0.0, 1.0, 0.0], 180)
     found = quality_notes(levels + noise * rng.standard_normal(900))
     assert not any("begins again" in note for note in found)
+
+
+@pytest.mark.parametrize("step", [0.001, 0.002, 0.004])
+def test_the_peak_of_a_rounded_sine_is_no_limit(step):
+    sine = np.sin(np.arange(4000) * 2 * np.pi * 3 / 4000 + 0.3)
+    rounded = np.round(sine / step) * step
+    assert longest_run(rounded == rounded.max()) >= 5
+    assert not [one for one in quality_notes(rounded) if "clipped" in one]
+    cut = np.round(np.clip(sine, -0.8, 0.8) / step) * step
+    assert len([one for one in quality_notes(cut) if "clipped" in one]) == 2

@@ -355,6 +355,27 @@ def test_where_to_trust_it_is_said(contents):
     assert "leaves that range for 25 % of its samples" in plain(outside.details[1])
 
 
+def test_a_model_above_its_threshold_is_not_one_to_take(contents):
+    good = {name: np.array([90.0]) for name in ("fit_percent", "linear_fit_percent")}
+    worse = {"linear_rmsd": 2.0 * contents.answer.rmsd, **good}
+    limit = float(contents.answer.rmsd[0])
+    above = answered(contents, threshold=limit, **worse)
+    assert above.verdict.startswith("Not below the threshold of ")
+    assert "hwid next CONFIG" in [command for _, command in above.next_steps]
+    below = answered(contents, threshold=1.01 * limit, **worse)
+    assert below.verdict.startswith(f"Take {contents.answer.name}: ")
+    assert "hwid next CONFIG" not in [command for _, command in below.next_steps]
+
+
+def test_a_band_that_holds_too_little_is_said(contents):
+    found = answered(contents, held=(("step_09", 0.59),))
+    assert "Do not rely on its band of 90 %: it holds 59 % of step_09." in plain(
+        found.details[1]
+    )
+    found = answered(contents, held=(("step_09", 0.89),))
+    assert "rely" not in found.details[1]
+
+
 def test_recommended_orders_and_maps_are_said(contents):
     advice = contents.answer.advice
     maps = ChosenMaps(advice.nb, advice.nk, "saturation", "none")
@@ -363,9 +384,17 @@ def test_recommended_orders_and_maps_are_said(contents):
     told = plain(answered(contents, maps=maps, **worse).details[1])
 
     assert f"Recommended for new fits: nb = {advice.nb}, nk = {advice.nk}" in told
-    assert "maps: saturation and none" in told
+    assert "Recommended maps: saturation and none" in told
     none = ChosenMaps(advice.nb, advice.nk, "none", "none")
-    assert "; no maps." in plain(answered(contents, maps=none, **worse).details[1])
+    said = plain(answered(contents, maps=none, **worse).details[1])
+    assert "Recommended maps: none." in said
+    # The model shown has others: the page says why.
+    others = answered(contents, place=(advice.nb, advice.nk + 1), **worse).details[1]
+    assert f"This model has {advice.nb}/{advice.nk + 1}: it is chosen as one" in others
+    own = answered(contents, place=(advice.nb, advice.nk), **worse).details[1]
+    assert "chosen as one" not in own
+    chosen = answered(contents, maps=maps, own_maps=(("dead_zone", 0),), **worse)
+    assert "those of this model came closest" in chosen.details[1]
     # A page that recommends other maps than it shows says how to get them.
     steps = answered(contents, maps=maps, has_these_maps=False, **worse).next_steps
     keys = "put input_map: saturation, output_map: none into fit"

@@ -5,17 +5,19 @@ from types import SimpleNamespace
 import pytest
 
 from hwid_cli.records.best_model import BestModel
+from hwid_cli.records.groups import SingleModels
 from hwid_cli.report.closing import (
+    above_threshold_hint,
     best_model_sentences,
     closing_text,
     recordings_sentence,
+    why_other_orders,
 )
 
 BEST = BestModel(
     *("a+b/2/3", "test", ("c", "d"), 0.012, "m", 0.01),
     linear_rmsd=0.03,
-    single="a/2/2",
-    single_rmsd=0.011,
+    singles=SingleModels("a/2/2", 0.011, "a/2/2", 0.011),
 )
 
 
@@ -40,9 +42,60 @@ def test_a_failure_to_help_is_said():
 
     assert "mean RMSD 0.012 m on 2 recordings never used (c and d)" in said
     assert "NOT below the 0.01 m" in said
-    assert "joining recordings does not help here: a/2/2 alone 0.011 m" in said
+    assert "joining recordings does not help here: a/2/2, the single model" in said
+    assert said.endswith("leaves 0.011 m")
     better = replace(BEST, rmsd=0.009)
     assert "joining recordings helps here" in "; ".join(best_model_sentences(better))
+
+
+def test_a_single_model_that_only_the_test_would_choose_is_named_beside():
+    # What a reader of the tables finds: one that is nearer there than both.
+    singles = SingleModels("a/2/2", 0.015, "b/1/1", 0.010)
+    said = "; ".join(best_model_sentences(replace(BEST, singles=singles)))
+    said = said.replace("\xa0", " ")
+    assert "joining recordings helps here: a/2/2, the single model chosen in" in said
+    assert "leaves 0.015 m; b/1/1 happens to be nearer, 0.01 m, which only" in said
+    farther = replace(singles, nearest_rmsd=0.013)
+    assert "happens" not in "; ".join(
+        best_model_sentences(replace(BEST, singles=farther))
+    )
+
+
+@pytest.mark.parametrize(
+    ("held", "said"),
+    [
+        (
+            (("c", 0.59), ("d", 0.80)),
+            "holds 70 % of the recordings never used, 59 % of c",
+        ),
+        ((("c", 0.4),), "it holds 40 % of c"),
+        ((("c", 0.59), ("d", 0.92)), ""),
+        ((), ""),
+    ],
+)
+def test_a_band_that_holds_too_little_is_no_band_to_rely_on(held, said):
+    found = best_model_sentences(replace(BEST, held=held))
+    warned = [one.replace("\xa0", " ") for one in found if "its band of" in one]
+    assert bool(warned) is bool(said)
+    assert all(one.endswith(said) for one in warned)
+
+
+def test_a_model_with_other_orders_than_the_recommended_ones_says_why():
+    assert why_other_orders("it", (2, 3), (2, 3)) == ""
+    assert why_other_orders("it", (2, 3), (1, 3)).startswith(
+        "it has 2/3: it is chosen as one"
+    )
+    assert BEST.place == (2, 3)
+
+
+def test_the_hint_of_a_model_that_is_too_far_off_leaves_out_what_was_done():
+    text = above_threshold_hint("e.yaml", has_order=False, has_next=False)
+    assert "hwid order" in text
+    assert "with 'next: {limits: " in text
+    assert "in e.yaml" in text
+    text = above_threshold_hint("e.yaml", has_order=True, has_next=True)
+    assert "hwid order" not in text
+    assert "limits" not in text
 
 
 def test_a_linear_model_without_a_name_is_the_one_of_the_same_orders():

@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.records.groups import ChainTrend
+from hwid_cli.records.groups import ChainTrend, SingleModels
 from hwid_cli.report.final_test import (
     chain_coverage_table,
     chain_on_tests_table,
@@ -36,10 +36,11 @@ def test_the_chain_on_the_tests_shows_each_rmsd_and_the_mean():
     values = FINAL.rmsd[-1][[FINAL.recordings.index(n) for n in FINAL.tested_on]]
     shown = last.replace("*", "").split()
     assert shown == [WINNER, *(f"{v:.2e}" for v in [*values, np.mean(values)])]
-    said = " ".join([trend_sentence(TREND), *joining_sentence(TREND)])
-    assert " ".join(text.split()).endswith(said)
+    joined = joining_sentence(TREND.tested_rmsd[-1], TREND.singles, FINAL.unit)
+    said = " ".join([trend_sentence(TREND), *joined])
+    assert " ".join(text.split()).endswith(" ".join(said.split()))
     alone = next(line for line in text.splitlines() if line.startswith("step_11/4/7"))
-    assert alone.split()[-1] == f"{TREND.single_rmsd:.2e}"
+    assert alone.split()[-1] == f"{TREND.singles.chosen_rmsd:.2e}"
     assert "form of T3.3.3.4-1" in text
     assert widest_line(text) <= 80
 
@@ -219,12 +220,20 @@ def test_long_names_of_groups_stand_beneath_the_table_once():
 
 
 def test_joining_is_said_to_help_only_where_it_does():
-    group = replace(TREND, models=("a", "a+b"), tested_rmsd=(0.3, 0.1))
-    better = replace(group, best_single="c/1/1", single_rmsd=0.2)
+    singles = SingleModels(FINAL.models[0], 0.2, FINAL.models[0], 0.2)
+    tested = (*TREND.tested_rmsd[:-1], 0.1)
+    group = replace(TREND, tested_rmsd=tested, singles=singles)
+    assert "+" in group.models[-1]
 
-    assert joining_sentence(better)[0].startswith("Joining helps here: 0.1 ")
-    worse = replace(better, single_rmsd=0.05)
-    assert joining_sentence(worse)[0].startswith("Joining does not help here: 0.1 ")
-    assert joining_sentence(replace(better, models=("a",), tested_rmsd=(0.3,))) == ()
-    assert joining_sentence(replace(better, best_single="")) == ()
-    assert joining_sentence(replace(better, single_rmsd=float("nan"))) == ()
+    def said(trend):
+        return " ".join(chain_on_tests_table(FINAL, trend).notes)
+
+    assert f"Joining recordings helps here: {FINAL.models[0]}, " in said(group)
+    assert "Joining recordings does not help here: " in said(
+        replace(group, singles=replace(singles, chosen_rmsd=0.05))
+    )
+    alone = replace(group, models=(*TREND.models[:-1], "step_06/3/7"))
+    assert "Joining" not in said(alone)
+    assert "Joining" not in said(replace(group, singles=None))
+    unknown = replace(singles, chosen_rmsd=float("nan"))
+    assert joining_sentence(0.1, unknown, "m") == ()

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from hwid_cli.model.fit import fit
-from hwid_cli.records.groups import FinalTest
+from hwid_cli.records.groups import FinalTest, SingleModels
 from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
@@ -101,17 +101,18 @@ def test_with_one_recording_for_the_fits_the_test_recordings_judge_its_best_mode
 
 
 def test_a_group_stands_beside_the_best_single_model():
-    models = ("a/1/1", "a+b/1/1")
+    models = ("a/1/1", "b/1/1", "a+b/1/1")
     table = final(
         models,
-        [[0, 0.5, 3, 5], [0.1, 0.1, 1, 2]],
-        [[1, 0, 0, 0], [1, 1, 0, 0]],
-        models[1:],
+        # The second one covers less of what chooses and is nearer on the test.
+        [[0, 0.5, 3, 5], [9, 0, 1, 1.5], [0.1, 0.1, 1, 2]],
+        [[1, 0, 0, 0], [0, 1, 0, 0], [1, 1, 0, 0]],
+        models[2:],
     )
     found = best_model({"test": table})
 
-    assert (found.name, found.single) == ("a+b/1/1", "a/1/1")
-    assert (found.rmsd, found.single_rmsd) == (1.5, 4.0)
+    assert (found.name, found.rmsd) == ("a+b/1/1", 1.5)
+    assert found.singles == SingleModels("a/1/1", 4.0, "b/1/1", 1.25)
 
 
 def test_nothing_is_recommended_where_nothing_has_run():

@@ -261,8 +261,8 @@ def test_the_best_single_model_is_chosen_without_the_test_and_its_own_recording(
     best = min(found, key=found.get)
     row = final.rmsd[final.models.index(best)]
     tested = [row[final.recordings.index(name)] for name in final.tested_on]
-    assert trend.best_single == best
-    assert trend.single_rmsd == pytest.approx(np.mean(tested), rel=1e-12)
+    assert trend.singles.chosen == best
+    assert trend.singles.chosen_rmsd == pytest.approx(np.mean(tested), rel=1e-12)
 
 
 def test_without_a_chain_the_trend_is_empty():

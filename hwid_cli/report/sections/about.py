@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from hwid_cli.records.report import ReportContents
 from hwid_cli.report.fits import fits_status
 from hwid_cli.report.formats import MISSING, counted, listed
-from hwid_cli.report.page import Collapsible, PageBlock, Section
+from hwid_cli.report.page import Collapsible, PageBlock, Section, to_copy
 from hwid_cli.report.table import Cell, Code, Heading, Table, Text, numbers, texts
 
 # Characters of a hash that tell files and runs apart for the eye.
@@ -36,7 +36,10 @@ def about_section(contents: ReportContents, missing: Sequence[Section]) -> Secti
     blocks += [Text(one) for one in changed]
     if missing:
         blocks.append(Heading("Not shown"))
-        blocks += [Text(f"{one.short}: {one.missing}", is_note=True) for one in missing]
+        blocks += [
+            Text(to_copy(f"{one.short}: {one.missing}", stored), is_note=True)
+            for one in missing
+        ]
     blocks.append(
         Collapsible(
             "Stages, keys and versions of packages",

@@ -15,7 +15,14 @@ from hwid_cli.report.charts import (
     thinned_places,
     thinning,
 )
-from hwid_cli.report.closing import LINEAR_KEYS, UNDECIDED_MAPS, linear_is
+from hwid_cli.report.closing import (
+    LINEAR_KEYS,
+    NEXT_KEYS,
+    UNDECIDED_MAPS,
+    linear_is,
+    narrow_band_sentence,
+    why_other_orders,
+)
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
 from hwid_cli.report.formats import counted, listed, with_unit
 from hwid_cli.report.map_words import fit_keys, map_words
@@ -85,9 +92,11 @@ def _verdict(found: ModelAnswer) -> str:
             f"A linear model is {how}: {mean} {linear}, with the maps of "
             f"the configuration {own}, on {where} {unused}. Those are not worth it here."
         )
-    sentence = (
-        f"Take {found.name}: fit {_median(found.fit_percent)} on {where} {unused}"
-    )
+    start = f"Take {found.name}"
+    if found.is_above_threshold:
+        limit = with_unit(found.threshold, found.unit)
+        start = f"Not below the threshold of {limit} yet: {found.name}"
+    sentence = f"{start}: fit {_median(found.fit_percent)} on {where} {unused}"
     if np.isfinite(found.linear_fit_percent).any():
         sentence += f" (linear: {_median(found.linear_fit_percent)})"
     if found.linear_mean_rmsd < found.mean_rmsd:
@@ -186,17 +195,31 @@ def _orders(found: ModelAnswer, nk_role: str) -> str:
             f" (the smallest within {100 * (one.evidence.factor - 1):.2g} % of the best, "
             f"{one.best_nb}/{one.best_nk})"
         )
-    if found.maps is not None and found.is_usable:
-        pair = (
-            map_words(found.maps.input_map, found.maps.input_units),
-            map_words(found.maps.output_map, found.maps.output_units),
-        )
+    if why := why_other_orders("This model", found.place, (one.nb, one.nk)):
+        text += f". {why}"
+    return f"{text}.{_at_these(found)}{_recommended_maps(found)}"
+
+
+def _recommended_maps(found: ModelAnswer) -> str:
+    """Recommended maps, and why the model has others where it does."""
+    maps = found.maps
+    if maps is None or not found.is_usable:
+        return ""
+    if not maps.has_maps:
+        return " Recommended maps: none."
+    pair = (
+        map_words(maps.input_map, maps.input_units),
+        map_words(maps.output_map, maps.output_units),
+    )
+    text = f" Recommended maps: {pair[0]} and {pair[1]}"
+    if found.own_maps:
         text += (
-            f"; maps: {pair[0]} and {pair[1]}" if found.maps.has_maps else "; no maps"
+            ", for models of one recording; those of this model came closest to recordings "
+            "left out of it in turn"
         )
-        if found.maps.has_maps and found.is_linear_better:
-            text += " (chosen on other recordings than those that judge here)"
-    return f"{text}.{_at_these(found)}"
+    elif found.is_linear_better:
+        text += " (chosen on other recordings than those that judge here)"
+    return f"{text}."
 
 
 def _at_these(found: ModelAnswer) -> str:
@@ -231,7 +254,10 @@ def _trust(found: ModelAnswer) -> str:
             f"; {found.recordings[worst]} leaves that range for "
             f"{100 * float(found.beyond[worst]):.0f}\N{NO-BREAK SPACE}% of its samples"
         )
-    return f"{text}."
+    text += "."
+    if narrow := narrow_band_sentence(found.held):
+        text += f" {narrow[:1].upper()}{narrow[1:]}."
+    return text
 
 
 def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str], ...]:
@@ -258,12 +284,7 @@ def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str]
             (_other_maps(found), "hwid run CONFIG"),
         ]
     else:
-        steps.append(
-            (
-                "Take it elsewhere:",
-                f"hwid export CONFIG --model {quote(found.name)} --format json",
-            )
-        )
+        steps += _as_it_is(found)
     if contents.stored.diagnosis is None:
         steps.append(
             (
@@ -272,6 +293,17 @@ def _next(found: ModelAnswer, contents: ReportContents) -> tuple[tuple[str, str]
             )
         )
     return tuple(steps)
+
+
+def _as_it_is(found: ModelAnswer) -> list[tuple[str, str]]:
+    """Take the model, after what may still bring it below the threshold."""
+    export = f"hwid export CONFIG --model {quote(found.name)} --format json"
+    if not found.is_above_threshold:
+        return [("Take it elsewhere:", export)]
+    return [
+        (f"Which recordings are missing; needs {NEXT_KEYS}:", "hwid next CONFIG"),
+        ("Take it as it is:", export),
+    ]
 
 
 def _errors(found: ModelAnswer) -> Dots | None:
