@@ -83,6 +83,23 @@ const stems = (u, seriesIdx) => {
 const charts = new Map();
 let numbered = 0;
 
+// The label of an axis with a font that fits into so many pixels; words at its beginning go
+// where none does: the symbol and the unit stay, the caption has the words.
+const fitted = (label, room) => {
+  if (!label) return {};
+  const ctx = make("canvas", {}).getContext("2d");
+  for (let words = label.split(" "), bracket; ; words = words.slice(1)) {
+    bracket = words.findIndex(one => one.startsWith("["));
+    for (const px of [12, 11, 10]) {
+      const labelFont = `${px}px system-ui, sans-serif`;
+      ctx.font = labelFont;
+      const text = words.join(" ");
+      if (ctx.measureText(text).width <= room || (px === 10 && (bracket < 2 || words.length < 2)))
+        return { label: text, labelFont };
+    }
+  }
+};
+
 class Chart {
   constructor(figure) {
     this.figure = figure;
@@ -232,7 +249,7 @@ class Chart {
       axes: [
         { ...axis, size: isLast ? 24 : 8, label: isLast ? this.spec.xl : undefined, labelSize: 16,
           values: isLast ? this.numbers : (u, splits) => splits.map(() => ""), space: 60 },
-        { ...axis, size: 62, label: panel.yl, labelSize: 18, values: this.numbers, space: 26 },
+        { ...axis, size: 62, ...fitted(panel.yl, size.height - (isLast ? 52 : 20)), labelSize: 18, values: this.numbers, space: 26 },
       ],
       hooks: {
         setScale: [(u, key) => {
