@@ -20,6 +20,8 @@ _SPEEDS = (0.3, 0.6)
 _BENDS = (0.15, 0.4)
 # The same at which it peaks, to either side, and how wide a peak is.
 _PEAKS, _WIDTHS = (0.1, 0.35, 0.7), (0.1, 0.3)
+# Gaps across which a force pulls; a motion never closes them.
+_GAPS = (1.4, 2.5)
 _MOST_WAVES = 2
 # Exponents that a power is tried with before it is refined.
 _POWERS = (0.5, 1.5, 2.0, 3.0, 5.0)
@@ -205,6 +207,14 @@ def _thresholds(scales: Scales) -> Iterator[Term]:
         }
         yield Term("1/(1 + ((x - a)/b)**2)", (0, 0, 0), a, "peaks at a place")
         yield Term("1/(1 + ((x + a)/b)**2)", (0, 0, 0), a, "peaks at a place below")
+    for share in _GAPS:
+        # Magnets, plates and coils that pull across a gap, to either side.
+        a = {"a": (share * scales.displacement_m, "m")}
+        for sign, side in (("-", "ahead"), ("+", "behind")):
+            near = f"/(1 {sign} x/a)**2"
+            yield Term(f"1{near}", (0, 0, 0), a, f"pulls across a gap {side}")
+            family = f"input pulls across a gap {side}"
+            yield Term(f"u**2{near}", (0, 0, 2), a, family)
     yield Term("Heaviside(x)*sign(v)", (0, 0, 0))
     yield Term("Heaviside(v)*v**2", (2, -2, 0))
 

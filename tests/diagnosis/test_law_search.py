@@ -23,7 +23,7 @@ DT, N = 1e-3, 600
 TIME = DT * np.arange(N)
 DRIVE = Drive(0.3, 15.0, 1184.0, 5.0)
 SCALES = Scales(
-    0.01, 0.3, 3.0, 100.0, 0.02, 15.0, 0.3, 10.0, DT, 0.6, (7.0, 13.0),
+    0.0135, 0.3, 3.0, 100.0, 0.02, 15.0, 0.3, 10.0, DT, 0.6, (7.0, 13.0),
     (Wave(0.004, 1.0, 0.0), Wave(0.002, 0.5, 0.0)),
 )  # fmt: skip
 TERMS = library(SCALES)
@@ -177,7 +177,19 @@ def test_a_force_that_levels_off_is_one_term():
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_a_force_that_fades_away_from_a_wall_is_an_exponential(side):
     # Air under a rotor, a magnet near iron: no series of powers holds far from the wall.
-    pair = motions(lambda x, v, u, t: 3.0 * np.exp(side * x / 0.0008), noise=1e-6)
+    pair = motions(lambda x, v, u, t: 3.0 * np.exp(side * x / 0.0011), noise=1e-6)
     found = regression(*pair, DRIVE, TERMS, through=True)
     sign = "-" if side < 0.0 else ""
     assert found_terms(found, 1) == {f"exp({sign}x/a)"}
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_force_across_a_gap_is_not_one_that_fades(side):
+    # A magnet 3 cm off: over the travel it grows to a factor of four.
+    pair = motions(lambda x, v, u, t: 3.0 / (1.0 + side * x / 0.03) ** 2, noise=1e-6)
+    found = regression(*pair, DRIVE, TERMS, through=True)
+    sign = "+" if side > 0.0 else "-"
+    assert found_terms(found, 1) == {f"1/(1 {sign} x/a)**2"}
+    pair = motions(lambda x, v, u, t: u**2 / (1.0 + side * x / 0.03) ** 2, noise=1e-6)
+    found = regression(*pair, DRIVE, TERMS, through=True)
+    assert found_terms(found, 1) == {f"u**2/(1 {sign} x/a)**2"}

@@ -118,6 +118,12 @@ CASES = {
     "a magnet beside the way": law(
         lambda x, v, u, t, w: 1.2 / (1 + ((x - 0.004) / 0.0015) ** 2), "peaks at a place"
     ),
+    "a magnet across a gap": law(
+        lambda x, v, u, t, w: 1.5 / (1 - x / 0.05) ** 2, "pulls across a gap ahead"
+    ),
+    "a coil across a gap": law(
+        lambda x, v, u, t, w: 0.25 * u**2 / (1 + x / 0.05) ** 2, "input pulls across a gap behind"
+    ),
     "waves of damping": law(
         lambda x, v, u, t, w: -7 * np.sin(2 * np.pi * x / 0.007) * v, "wave*v sin", ("wave*v sin", "wave*v cos")
     ),
