@@ -177,7 +177,7 @@ def test_a_force_that_levels_off_is_one_term():
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_a_force_that_fades_away_from_a_wall_is_an_exponential(side):
     # Air under a rotor, a magnet near iron: no series of powers holds far from the wall.
-    pair = motions(lambda x, v, u, t: 3.0 * np.exp(side * x / 0.0011), noise=1e-6)
+    pair = motions(lambda x, v, u, t: 3.0 * np.exp(side * x / 0.002), noise=1e-6)
     found = regression(*pair, DRIVE, TERMS, through=True)
     sign = "-" if side < 0.0 else ""
     assert found_terms(found, 1) == {f"exp({sign}x/a)"}

@@ -118,6 +118,9 @@ CASES = {
     "a magnet beside the way": law(
         lambda x, v, u, t, w: 1.2 / (1 + ((x - 0.004) / 0.0015) ** 2), "peaks at a place"
     ),
+    "air near a wall": law(
+        lambda x, v, u, t, w: 0.6 * np.exp(-x / 0.008), "fades along the way"
+    ),
     "a magnet across a gap": law(
         lambda x, v, u, t, w: 1.5 / (1 - x / 0.05) ** 2, "pulls across a gap ahead"
     ),
