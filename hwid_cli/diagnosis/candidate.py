@@ -455,12 +455,19 @@ def at_point(
     )
 
 
+def needs_input_noise(
+    problem: DiagnosisProblem, fit: CandidateFit, noise: NoiseFloor
+) -> bool:
+    """Whether a fit leaves what noise of the input, if there is some, might explain."""
+    is_open = 1.0 < fit.whiteness < np.inf
+    return is_open and noise.input_rms > 0 and not problem.compares_command
+
+
 def with_input_noise(
     problem: DiagnosisProblem, fit: CandidateFit, scales: Scales, noise: NoiseFloor
 ) -> CandidateFit:
     """A fit with the input's noise in mind, if nothing else remains then."""
-    may_help = 1.0 < fit.whiteness < np.inf and noise.input_rms > 0
-    if not may_help or problem.compares_command:
+    if not needs_input_noise(problem, fit, noise):
         return fit
     fit_layout, point = rebuilt(problem, fit, scales)
     if not may_be_input_noise(problem, fit_layout, point, noise):

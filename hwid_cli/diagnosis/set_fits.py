@@ -15,6 +15,7 @@ from hwid_cli.diagnosis.candidate import (
     Screened,
     SearchStart,
     fit_candidate,
+    needs_input_noise,
     residuals_of_few,
     screen,
     start_from,
@@ -102,6 +103,8 @@ class SetFits:
         self.train = rounds.problem.part(held_out=False)
         self.few = fewer_recordings(self.train, SCREENING_SAMPLES)
         self._tried: set[tuple[Effects, str]] = set()
+        # Fits as they were when the noise of the input was last taken into account.
+        self._with_noise: dict[Effects, CandidateFit] = {}
 
     def of_size(self, size: int) -> list[CandidateFit]:
         """All sets of a size."""
@@ -123,9 +126,29 @@ class SetFits:
         usable = [one for one in self.of_size(size) if one.is_usable]
         usable.sort(key=lambda one: -rounds.criteria.gain(one, rounds.base))
         scales, noise = rounds.baseline.scales, rounds.baseline.noise
-        for one in usable[:WITH_INPUT_NOISE]:
-            found = with_input_noise(rounds.problem, one, scales, noise)
-            self.found[one.effects] = found
+        asked = [
+            one
+            for one in usable[:WITH_INPUT_NOISE]
+            if self._with_noise.get(one.effects) is not one
+            and needs_input_noise(rounds.problem, one, noise)
+        ]
+        if not asked:
+            return
+        what = f"{name_of(size)}, with the noise of the input"
+        rounds.on_round(what, len(asked))
+        tasks = [
+            DiagnosisTask(
+                name=f"{'+'.join(one.effects)}, with the noise of the input",
+                function=with_input_noise,
+                arguments=(rounds.problem, one, scales, noise),
+                result_type=CandidateFit,
+                content={"with the noise of the input": one.effects},
+                arrays=(rounds.base.values, one.values, one.own),
+            )
+            for one in asked
+        ]
+        for found in rounds.run_tasks(tasks, keep=True):
+            self._with_noise[found.effects] = self.found[found.effects] = found
 
     def lowest_of_size(self, size: int) -> CandidateFit:
         """The set of a size with the lowest criterion, however much it brings."""

@@ -6,7 +6,6 @@ and its filter follows the motion. docs/method_diagnosis.md, eq. (D27), (D27a).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -94,8 +93,10 @@ class StraightDrive:
     def whitening(self, strength: float) -> StationaryFilter | None:
         """From a residual to its innovations; None without a filter."""
         covariance = self.covariance(strength)
-        if covariance is None:
-            return None
+        return None if covariance is None else self.filter_of(covariance, strength)
+
+    def filter_of(self, covariance: np.ndarray, strength: float) -> StationaryFilter:
+        """The filter that belongs to the settled covariance of its state."""
         a, c, through = self.a, self.c, self.through
         both = strength * through * self.b[:, None]
         variance = float((c @ covariance @ c.T)[0, 0]) + 1.0 + strength * through**2
@@ -124,36 +125,30 @@ class CurvedDrive:
     ----------
     mean : StraightDrive
         With the mean of its springs.
-    springs : tuple of StraightDrive
-        From soft to stiff.
+    tables : tuple of three ndarray
+        a, b and through of several springs, from soft to stiff.
     at : ndarray, shape (n_samples,)
         Where between them the spring is after each sample that is evaluated.
     """
 
     mean: StraightDrive
-    springs: tuple[StraightDrive, ...]
+    tables: _Tables
     at: np.ndarray
-
-    @cached_property
-    def _tables(self) -> _Tables:
-        """a, b and through of all springs."""
-        a = np.array([one.a for one in self.springs])
-        b = np.array([one.b for one in self.springs])
-        return a, b, np.array([one.through for one in self.springs])
 
     def whitening(self, strength: float) -> Whitening | None:
         """From a residual to its innovations; None without a filter."""
-        first, mean = self.mean.covariance(strength), self.mean.whitening(strength)
-        if first is None or mean is None:
+        first = self.mean.covariance(strength)
+        if first is None:
             return None
+        mean = self.mean.filter_of(first, strength)
         reading = int(np.argmax(self.mean.c[0]))
-        return CurvedFilter(self.at, self._tables, reading, strength, first, mean)
+        return CurvedFilter(self.at, self.tables, reading, strength, first, mean)
 
     def moved(self, size: int) -> tuple[float, float]:
         """Mean square of the reading that noise of variance 1 makes from rest."""
         reading = int(np.argmax(self.mean.c[0]))
         _, draws = self.mean.moved(size)
-        return float(_spread(self.at[:size], self._tables, reading)), draws
+        return float(_spread(self.at[:size], self.tables, reading)), draws
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,12 +307,15 @@ def noisy_drives(
 def _curved(drive: Drive, sample_time_s: float, stiffness: np.ndarray) -> CurvedDrive:
     """A drive with the stiffness of each sample."""
     low, high = float(stiffness.min()), float(stiffness.max())
-    springs = np.linspace(low, high, _N_SPRINGS)
     at = (stiffness - low) / (high - low) * (_N_SPRINGS - 1)
-
     mean = straight_drive(drive, sample_time_s, float(np.mean(stiffness)))
-    each = tuple(straight_drive(drive, sample_time_s, float(one)) for one in springs)
-    return CurvedDrive(mean, each, at)
+    # The equations are straight in the stiffness: those of two springs tell the others.
+    softest, push, reading = linear_equations(drive, low)
+    stiffest, *_ = linear_equations(drive, high)
+    share = np.linspace(0.0, 1.0, _N_SPRINGS)[:, None, None]
+    changes = softest + share * (stiffest - softest)
+    tables = _steps(changes, push, reading, sample_time_s, is_held=drive.hold == HELD)
+    return CurvedDrive(mean, tables, at)
 
 
 def straight_drive(
@@ -332,20 +330,50 @@ def straight_drive(
         beyond a quarter turn.
     """
     change, push, reading = linear_equations(drive, stiffness)
-    n = push.size
-    # State, input, and its slope.
-    block = np.zeros((n + 2, n + 2))
-    block[:n, :n], block[:n, n] = change, push
-    block[n, n + 1] = 1.0 / sample_time_s
-    step = scipy.linalg.expm(block * sample_time_s)
-    a, rising = step[:n, :n], step[:n, n + 1]
-    if drive.hold == HELD:
-        rising = np.zeros(n)
-    falling = step[:n, n] - rising
+    a, b, through = (
+        one[0]
+        for one in _steps(
+            change[None], push, reading, sample_time_s, is_held=drive.hold == HELD
+        )
+    )
     c = reading[None, :]
-    b, through = a @ rising + falling, float((c @ rising)[0])
     is_told = np.any(change != 0.0, axis=0) | (reading != 0.0)
     if not is_told[0]:
         # Nothing tells where it is.
-        return StraightDrive(a[1:, 1:], b[1:], c[:, 1:], through)
-    return StraightDrive(a, b, c, through)
+        return StraightDrive(a[1:, 1:], b[1:], c[:, 1:], float(through))
+    return StraightDrive(a, b, c, float(through))
+
+
+def _steps(
+    changes: np.ndarray,
+    push: np.ndarray,
+    reading: np.ndarray,
+    sample_time_s: float,
+    *,
+    is_held: bool,
+) -> _Tables:
+    """From sample to sample, the input held or a straight line between them.
+
+    Parameters
+    ----------
+    changes : ndarray, shape (n_springs, n_states, n_states)
+        Of the state equations, one for each spring.
+    push, reading : ndarray, shape (n_states,)
+
+    Returns
+    -------
+    a : ndarray, shape (n_springs, n_states, n_states)
+    b : ndarray, shape (n_springs, n_states)
+    through : ndarray, shape (n_springs,)
+    """
+    n = push.size
+    # State, input, and its slope.
+    blocks = np.zeros((len(changes), n + 2, n + 2))
+    blocks[:, :n, :n], blocks[:, :n, n] = changes, push
+    blocks[:, n, n + 1] = 1.0 / sample_time_s
+    steps = scipy.linalg.expm(blocks * sample_time_s)
+    a = np.ascontiguousarray(steps[:, :n, :n])
+    rising = np.zeros((len(changes), n)) if is_held else steps[:, :n, n + 1]
+    falling = steps[:, :n, n] - rising
+    b = np.einsum("sij,sj->si", a, rising) + falling
+    return a, b, rising @ reading

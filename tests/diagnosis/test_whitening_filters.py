@@ -128,8 +128,8 @@ def test_a_spring_that_hardly_bends_is_one():
     found = drive_of(little)
     straight = straight_drive(little, STEP_S)
     np.testing.assert_array_equal(found.a, straight.a)
-    assert not hasattr(found, "springs")
-    assert hasattr(drive_of(HARD), "springs")
+    assert not hasattr(found, "tables")
+    assert hasattr(drive_of(HARD), "tables")
 
 
 def test_the_spring_is_that_of_the_samples_that_are_evaluated():
