@@ -96,7 +96,13 @@ class StraightDrive:
         return None if covariance is None else self.filter_of(covariance, strength)
 
     def filter_of(self, covariance: np.ndarray, strength: float) -> StationaryFilter:
-        """The filter that belongs to the settled covariance of its state."""
+        """The filter that belongs to the settled covariance of its state.
+
+        Parameters
+        ----------
+        covariance : ndarray, shape (n_states, n_states)
+            As ``covariance`` gives it, in units of the output's noise.
+        """
         a, c, through = self.a, self.c, self.through
         both = strength * through * self.b[:, None]
         variance = float((c @ covariance @ c.T)[0, 0]) + 1.0 + strength * through**2

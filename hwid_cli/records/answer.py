@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hwid_cli.records.best_model import is_linear_preferred
+from hwid_cli.records.groups import SpoiltJoin
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.order import OrderChoice
 
@@ -75,6 +76,8 @@ class ModelAnswer:
         Kind and units of its maps where they were chosen for it alone; empty else.
     place : tuple of int, [-]
         Its place in the order grid.
+    spoilt : SpoiltJoin or None
+        The model of several recordings that was not taken, if a single one beats it.
     held : tuple of (str, float)
         Recordings that nothing has used, and the share of each that its band of 90 %
         holds, [-]; empty where there is no band.
@@ -109,6 +112,7 @@ class ModelAnswer:
     has_these_maps: bool = True
     own_maps: tuple[tuple[str, int], ...] = ()
     place: tuple[int, int] = (0, 0)
+    spoilt: SpoiltJoin | None = None
     held: tuple[tuple[str, float], ...] = ()
     advised_rmsd: float = float("nan")
     advised_name: str = ""

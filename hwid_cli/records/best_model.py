@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import isfinite
 
-from hwid_cli.records.groups import SingleModels
+from hwid_cli.records.groups import SingleModels, SpoiltJoin
 
 # In front of a model's name: the linear one of these orders and recordings.
 LINEAR = "linear:"
@@ -59,6 +59,8 @@ class BestModel:
     singles : SingleModels or None
         Of a group: models of single recordings on the same recordings; None where there
         is none.
+    spoilt : SpoiltJoin or None
+        The model of several recordings that was not taken, if a single one beats it.
     fit_percent, linear_fit_percent : float, [%]
         Medians over ``judged_on`` of the model and of the linear one; NaN where that is
         not known.
@@ -87,6 +89,7 @@ class BestModel:
     chosen_on: tuple[str, ...] = ()
     linear_rmsd: float = float("nan")
     singles: SingleModels | None = None
+    spoilt: SpoiltJoin | None = None
     fit_percent: float = float("nan")
     linear_fit_percent: float = float("nan")
     linear_name: str = ""

@@ -344,6 +344,28 @@ class SingleModels:
     nearest_rmsd: float
 
 
+@dataclass(frozen=True)
+class SpoiltJoin:
+    """A model of several recordings that one of a single recording beats on their own.
+
+    Parameters
+    ----------
+    model : str
+        The joined one.
+    rmsd, single_rmsd : float, [output unit]
+        Geometric means over the recordings that the single one has not seen, those for the
+        test apart; the joined one was fitted to them.
+    suspect : str
+        Recording that no model of another one predicts and whose model predicts no other
+        one; empty where none stands out.
+    """
+
+    model: str
+    rmsd: float
+    single_rmsd: float
+    suspect: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class ChainTrend:
     """What happens along the chain of groups.

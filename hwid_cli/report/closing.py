@@ -8,6 +8,7 @@ import numpy as np
 
 from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.records.groups import SpoiltJoin
 from hwid_cli.records.next import NextRecordings
 from hwid_cli.records.order import MapAdvice, OrderAdvice
 from hwid_cli.report.final_test import joining_sentence
@@ -97,7 +98,32 @@ def best_model_sentences(best: BestModel) -> list[str]:
     if best.own_maps:
         maps = " and ".join(map_words(*one) for one in best.own_maps)
         said.append(f"its maps, {maps}, come closest to recordings left out in turn")
+    if best.spoilt is not None:
+        said.append(spoilt_sentence(best.spoilt, best.unit))
     return [*said, *_beside(best)]
+
+
+def spoilt_sentence(spoilt: SpoiltJoin, unit: str) -> str:
+    """Say why no joined model is taken, and which recording may have spoilt it.
+
+    Examples
+    --------
+    >>> said = spoilt_sentence(SpoiltJoin("a+b+c/1/2", 0.4, 0.1, "b"), "V")
+    >>> print(*said.split()[-8:])
+    and leave it out if it went wrong (recordings.exclude)
+    """
+    count = counted(spoilt.model.count("+") + 1, "recording")
+    joined, single = (with_unit(one, unit) for one in (spoilt.rmsd, spoilt.single_rmsd))
+    text = (
+        f"a model of {count} together is farther off its own ones ({joined}) than this one "
+        f"off those that it has not seen ({single})"
+    )
+    if not spoilt.suspect:
+        return f"{text}: some recordings contradict others"
+    return (
+        f"{text}: {spoilt.suspect} stands alone; look at it, and leave it out if it went "
+        "wrong (recordings.exclude)"
+    )
 
 
 def _beside(best: BestModel) -> list[str]:

@@ -27,6 +27,7 @@ from hwid_cli.stages.linear_reference import Roles, linear_reference
 from hwid_cli.stages.model_views import named_fits
 from hwid_cli.stages.order import recommend_overall
 from hwid_cli.stages.order_grid import grid_place
+from hwid_cli.stages.test import spoilt_join
 from hwid_cli.stages.together import own_maps
 
 
@@ -86,6 +87,7 @@ def model_answer(
         advice=advice,
         place=grid_place(found, stored.nk_role),
         held=() if final is None else held_by(name, final),
+        spoilt=None if final is None else spoilt_join(final, stored.recordings),
         noise_rms=differences_rms([one.output for one in unseen], 0.0) or np.nan,
     )
     answer = _with_maps(answer, found, fits, _maps(stored, advice))

@@ -22,7 +22,7 @@ from hwid_cli.stages.identify import Run
 from hwid_cli.stages.linear_reference import Roles, linear_reference
 from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.ranking import best_fits, widest_model
-from hwid_cli.stages.test import single_models, taken_model
+from hwid_cli.stages.test import single_models, spoilt_join, taken_model
 from hwid_cli.stages.together import own_maps
 
 
@@ -51,7 +51,8 @@ def best_model(
     if final is not None:
         place = taken_model(final)
         if place >= 0:
-            return _tested(place, final)
+            known = results.get("calibrate")
+            return _tested(place, final, () if known is None else known.recordings)
     if search is not None and search.chain:
         return _of_group(search)
     if crossval is not None:
@@ -62,7 +63,7 @@ def best_model(
     return None
 
 
-def _tested(place: int, final: FinalTest) -> BestModel:
+def _tested(place: int, final: FinalTest, recordings: Sequence[Recording]) -> BestModel:
     """A model on the recordings of the final test, a single one beside a group."""
     is_tested = np.isin(final.recordings, final.tested_on)
     mean = np.mean(final.rmsd[:, is_tested], axis=1)
@@ -78,7 +79,8 @@ def _tested(place: int, final: FinalTest) -> BestModel:
         held=held_by(final.models[place], final),
     )
     if "+" not in found.name:
-        return found
+        spoilt = spoilt_join(final, recordings) if recordings else None
+        return replace(found, spoilt=spoilt)
     return replace(found, singles=single_models(final))
 
 

@@ -13,7 +13,13 @@ import numpy as np
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import Experiment, FinalTestOptions
-from hwid_cli.records.groups import ChainTrend, FinalTest, GroupSearch, SingleModels
+from hwid_cli.records.groups import (
+    ChainTrend,
+    FinalTest,
+    GroupSearch,
+    SingleModels,
+    SpoiltJoin,
+)
 from hwid_cli.records.model import Fit
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.results import CrossValidation
@@ -60,7 +66,12 @@ from hwid_cli.trust.input_distance import input_distances
 from hwid_cli.trust.judged import PARTS
 
 NAME = "test"
-STAGE_VERSION = 6
+STAGE_VERSION = 7
+# Of fewer recordings none can be told to contradict the others.
+_FEWEST_JOINED = 3
+# A recording stands alone where it is this many times as far from the others as usual; how
+# far counts at most, over the standard deviation of the output, [-].
+_STANDS_OUT, _FARTHEST = 3.0, 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -428,9 +439,77 @@ def taken_model(final: FinalTest) -> int:
     int, [-]
         -1 where there is none.
     """
-    if final.chain:
-        return final.models.index(final.chain[-1])
-    return best_single(final)
+    single = best_single(final)
+    if not final.chain:
+        return single
+    joined = final.models.index(final.chain[-1])
+    return single if _is_beaten(final, joined, single) else joined
+
+
+def _is_beaten(final: FinalTest, joined: int, single: int) -> bool:
+    """Whether a single model predicts better than a joined one follows its own recordings.
+
+    What a fit has seen it is nearer to than to anything else: a recording among its own
+    must contradict the others.
+    """
+    if single < 0 or final.is_own[joined].sum() < _FEWEST_JOINED:
+        return False
+    own, unseen = _both_off(final, joined, single)
+    return bool(np.isfinite(unseen) and unseen < own)
+
+
+def _both_off(final: FinalTest, joined: int, single: int) -> tuple[float, float]:
+    """Geometric mean RMSD of both over what the single one has not seen, tests apart."""
+    is_judge = ~np.isin(final.recordings, final.tested_on) & ~final.is_own[single]
+    if not is_judge.any():
+        return np.nan, np.nan
+    # An RMSD of zero is the best there is.
+    with np.errstate(divide="ignore"):
+        logs = np.mean(np.log(final.rmsd[[joined, single]][:, is_judge]), axis=1)
+    return float(np.exp(logs[0])), float(np.exp(logs[1]))
+
+
+def spoilt_join(final: FinalTest, recordings: Sequence[Recording]) -> SpoiltJoin | None:
+    """The joined model that was not taken, and the recording that may have spoilt it.
+
+    Returns
+    -------
+    SpoiltJoin or None
+        None where the chain's last model is taken, or there is no chain.
+    """
+    if not final.chain:
+        return None
+    single, joined = best_single(final), final.models.index(final.chain[-1])
+    if not _is_beaten(final, joined, single):
+        return None
+    own, unseen = _both_off(final, joined, single)
+    return SpoiltJoin(final.models[joined], own, unseen, _suspect(final, recordings))
+
+
+def _suspect(final: FinalTest, recordings: Sequence[Recording]) -> str:
+    """The recording that stands alone: nothing predicts it, and it predicts nothing."""
+    sizes = {one.name: float(np.std(one.output)) or 1.0 for one in recordings}
+    known = [
+        n for n, name in enumerate(final.recordings) if name not in final.tested_on
+    ]
+    share = final.rmsd / np.array([sizes[name] for name in final.recordings])
+    share = np.minimum(np.nan_to_num(share, nan=_FARTHEST), _FARTHEST)
+    is_single = final.is_own.sum(axis=1) == 1
+    apart = {}
+    for place in known:
+        of_it, others = (
+            is_single & final.is_own[:, place],
+            [n for n in known if n != place],
+        )
+        by_others = share[is_single & ~final.is_own[:, place], place]
+        if of_it.any() and others and by_others.size:
+            off = (by_others.min(), share[of_it][:, others].min())
+            apart[final.recordings[place]] = min(off)
+    if len(apart) < _FEWEST_JOINED:
+        return ""
+    worst = max(apart, key=lambda name: apart[name])
+    usual = float(np.median(list(apart.values())))
+    return worst if apart[worst] > _STANDS_OUT * usual else ""
 
 
 def _write_csv(

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from hwid_cli.records.best_model import BestModel
-from hwid_cli.records.groups import SingleModels
+from hwid_cli.records.groups import SingleModels, SpoiltJoin
 from hwid_cli.report.closing import (
     above_threshold_hint,
     best_model_sentences,
@@ -78,6 +78,18 @@ def test_a_band_that_holds_too_little_is_no_band_to_rely_on(held, said):
     warned = [one.replace("\xa0", " ") for one in found if "its band of" in one]
     assert bool(warned) is bool(said)
     assert all(one.endswith(said) for one in warned)
+
+
+def test_a_recording_that_spoils_a_joined_model_is_one_to_look_at():
+    spoilt = SpoiltJoin("a+b+c/1/2", 0.4, 0.1, "b")
+    alone = replace(BEST, name="a/2/3", singles=None, spoilt=spoilt)
+    said = "; ".join(best_model_sentences(alone)).replace("\xa0", " ")
+    assert "3 recordings together is farther off its own ones (0.4 m)" in said
+    assert "seen (0.1 m): b stands alone; look at it" in said
+    unclear = replace(alone, spoilt=replace(spoilt, suspect=""))
+    assert "some recordings contradict others" in "; ".join(
+        best_model_sentences(unclear)
+    )
 
 
 def test_a_model_with_other_orders_than_the_recommended_ones_says_why():

@@ -16,6 +16,8 @@ from hwid_cli.stages.test import (
     final_test_key,
     score_final_models,
     score_table,
+    spoilt_join,
+    taken_model,
 )
 from hwid_cli.tasks.cache import MemoryStore
 from hwid_cli.tasks.runner import RunSettings, Workers
@@ -269,3 +271,54 @@ def test_without_a_chain_the_trend_is_empty():
     trend = chain_trend(example_final_test(n_chain=0), KINDS)
 
     assert (trend.models, trend.tested_rmsd, trend.total) == ((), (), ())
+
+
+def joined_and_singles(own_of_joined, unseen_of_single):
+    """Four recordings, a single model of each, and a model of the first three."""
+    singles = np.full((4, 5), 2.0)
+    singles[0] = [0.1, *([unseen_of_single] * 3), 1.0]
+    singles[1:, 0] = 2.0
+    joined = [own_of_joined] * 4 + [1.5]
+    names = ("a", "b", "c", "d", "e")
+    is_own = np.zeros((5, 5), dtype=bool)
+    is_own[:4, :4] = np.eye(4, dtype=bool)
+    is_own[4, :4] = True
+    models = ("a/1/1", "b/1/1", "c/1/1", "d/1/1", "a+b+c+d/1/1")
+    return score_table(
+        ScoredModels(models, names, np.vstack([singles, joined]), is_own, 0.5),
+        chain=models[4:],
+        tested_on=("e",),
+        distances=np.ones((5, 5)),
+        unit="m",
+    )
+
+
+def test_a_joined_model_that_its_own_recordings_refuse_is_not_taken():
+    spoilt = joined_and_singles(own_of_joined=0.9, unseen_of_single=0.3)
+    assert spoilt.models[taken_model(spoilt)] == "a/1/1"
+    sound = joined_and_singles(own_of_joined=0.2, unseen_of_single=0.3)
+    assert sound.models[taken_model(sound)] == "a+b+c+d/1/1"
+    assert spoilt_join(sound, ()) is None
+
+
+def test_the_recording_that_nothing_predicts_and_that_predicts_nothing_is_named():
+    rng = np.random.default_rng(3)
+    recordings = [
+        Recording(name, rng.normal(size=50), rng.normal(size=50), 1e-3)
+        for name in ("a", "b", "c", "d", "e")
+    ]
+    table = joined_and_singles(own_of_joined=0.9, unseen_of_single=0.3)
+    rmsd = table.rmsd.copy()
+    # Nothing predicts c well, and its model nothing else; b and d know one another.
+    rmsd[:4, 2] = [2.5, 2.5, 0.1, 2.5]
+    rmsd[1, 3] = rmsd[3, 1] = 0.3
+    found = spoilt_join(replace(table, rmsd=rmsd), recordings)
+    assert (found.model, found.suspect) == ("a+b+c+d/1/1", "c")
+    assert found.rmsd == pytest.approx(0.9)
+    assert found.single_rmsd == pytest.approx((0.3 * 2.5 * 0.3) ** (1 / 3))
+    # Where all are alike far from the others, none stands alone.
+    alike = np.where(table.is_own, 0.1, 0.4)
+    alike[4] = 0.9
+    found = spoilt_join(replace(table, rmsd=alike), recordings)
+    assert found is not None
+    assert found.suspect == ""

@@ -21,6 +21,7 @@ from hwid_cli.report.closing import (
     UNDECIDED_MAPS,
     linear_is,
     narrow_band_sentence,
+    spoilt_sentence,
     why_other_orders,
 )
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
@@ -167,6 +168,9 @@ def _model(found: ModelAnswer) -> str:
             f" {below} of {found.rmsd.size} below the threshold of "
             f"{with_unit(found.threshold, found.unit)}."
         )
+    if found.spoilt is not None:
+        said = spoilt_sentence(found.spoilt, found.unit)
+        text += f" {said[:1].upper()}{said[1:]}."
     return text + _noise(found) + _spread(found)
 
 
