@@ -29,6 +29,7 @@ from hwid_cli.data.column_words import (
     may_drive,
     meaning_of,
     place_in_chain,
+    standing,
 )
 from hwid_cli.data.units import (
     factor_between,
@@ -40,6 +41,8 @@ from hwid_cli.records.starter import FoundColumn
 
 # Columns that agree so far may both be the input, noise apart (a correlation), [-].
 _TWINS = 0.9999
+# The same of a column and a reading of it.
+_READ_AGAIN = 0.99
 _CURRENT_UNITS = ("a", "ma", "ka")
 # A name with a number at its end: u2.
 _NUMBERED = re.compile(r"(.*\D)(\d+)")
@@ -227,7 +230,7 @@ def _is_plug(one: _Named) -> bool:
 
 def _of_role(named: Sequence[_Named], role: str) -> list[_Named]:
     found = [one for one in named if one.meaning.role == role]
-    return sorted(found, key=lambda one: one.meaning.rank)
+    return sorted(found, key=lambda one: standing(one.meaning))
 
 
 def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
@@ -414,7 +417,25 @@ def _by_content(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
 
     first, last = max(pairs, key=worth)
     what = "by its content: other columns answer to it"
-    return first, last, {"input": what, "output": _ANSWERS}
+    clean = _without_noise(first, [one for one in named if one != last])
+    if clean != first:
+        what += f"; {_called(first.column)} is it with noise"
+    return clean, last, {"input": what, "output": _ANSWERS}
+
+
+def _without_noise(first: _Named, named: Sequence[_Named]) -> _Named:
+    """What was commanded, where a column is a noisy reading of it; else the column itself."""
+
+    def held(one: _Named) -> float:
+        return float(np.median([signs.held_share(part) for part in one.recordings]))
+
+    clean = [
+        one
+        for one in named
+        if signs.are_same(one.values, first.values, least=_READ_AGAIN)
+        and held(one) > held(first) + _CLEARLY_HELD
+    ]
+    return max(clean, key=held, default=first)
 
 
 def _current_of_twins(

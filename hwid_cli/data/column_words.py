@@ -188,6 +188,7 @@ _STATES = [
 _OF_AXES = {"iq", "uq", "ia", "ua"}
 # What a unit in brackets says of the role, by its first word.
 _INPUT_UNITS = {"a", "ma", "ka", "v", "mv", "kv", "n", "kn", "nm", "n m", "mnm", "%"}
+_PLACE_UNITS = {"m", "mm", "cm", "um", "µm", "rad", "deg", "°", "grad"}
 _OUTPUT_UNITS = {
     *("m", "mm", "cm", "um", "µm", "rad", "deg", "°", "grad", "rad/s", "m/s", "mm/s"),
     *("rpm", "1/min", "u/min", "min^-1", "deg/s", "°/s", "inc", "ticks/s"),
@@ -339,6 +340,24 @@ def meaning_of(title: str, stated: str = "") -> Meaning:
     numbers = "".join(re.findall(r"\d+", bare))
     others = [word for word in words if word != used and not word.isdecimal()]
     return Meaning(role, rank, unit, " ".join([*others, numbers]).strip())
+
+
+def standing(meaning: Meaning) -> int:
+    """Order among columns of one role, the most likely first, [-].
+
+    What is measured in a unit of length or angle is a place whatever it is called, and
+    places are what a drive is for: they stand before its speeds and pressures.
+
+    Examples
+    --------
+    >>> piston, pressure = meaning_of("piston [mm]"), meaning_of("Druck A [bar]")
+    >>> standing(piston) < standing(pressure), standing(pressure) == pressure.rank
+    (True, True)
+    """
+    is_place = meaning.role == "output" and meaning.unit.lower() in _PLACE_UNITS
+    if meaning.rank == OF_UNIT and is_place:
+        return _OUTPUT.index("abstand")
+    return meaning.rank
 
 
 def counts_recordings(title: str) -> bool:

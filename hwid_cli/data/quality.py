@@ -11,7 +11,7 @@ from hwid_cli.data.column_signs import held_share
 from hwid_cli.model.damaged_samples import find_damaged
 
 # Signals that hold their value for more of the time do so on purpose, [-].
-_HOLDS = 0.5
+HOLDS = 0.5
 # Fewest samples in a row at the largest or smallest value that are no coincidence, [-].
 _LIMIT_RUN = 5
 # A rounded peak takes as long through so many steps below its last one; the share by which
@@ -31,7 +31,9 @@ _DEAD_SHARE = 0.05
 _FAR = 50.0
 
 
-def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, ...]:
+def quality_notes(
+    values: np.ndarray, *, may_hold: bool = False, others_move: bool = False
+) -> tuple[str, ...]:
     """Say what is doubtful in a signal.
 
     Parameters
@@ -40,6 +42,8 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
         Finite.
     may_hold : bool
         Whether long stretches without change are no fault, as in an input.
+    others_move : bool
+        Whether the same signal changes from sample to sample in most recordings.
 
     Examples
     --------
@@ -49,7 +53,7 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
     """
     notes = []
     inside = (values != values.max()) & (values != values.min())
-    holds = held_share(values) >= _HOLDS
+    holds = held_share(values) >= HOLDS
     if not holds or _comes_back_from_limits(values, inside):
         for word, limit in (("largest", values.max()), ("smallest", values.min())):
             # A rest before the motion is no limit of the sensor.
@@ -60,6 +64,8 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
                     f"at its {word} value {limit:.4g} for {share:.2g} % of the time: "
                     "clipped?"
                 )
+    if others_move and not may_hold and (note := stuck_note(values)):
+        notes.append(note)
     if not holds:
         run = longest_run((np.diff(values) == 0) & inside[1:])
         if not may_hold and run >= _DEAD_SHARE * values.size:
@@ -82,6 +88,42 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
         what = "sample looks" if damaged == 1 else "samples look"
         notes.append(f"{damaged} {what} damaged")
     return tuple(notes)
+
+
+def stuck_note(values: np.ndarray) -> str:
+    """Say that a signal stops at full speed and stays there, as no motion does by itself.
+
+    A sensor that is torn off, freezes or is cut at a limit does; a motion that comes to
+    rest passes the last steps of its sensor one by one.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Finite; of a signal that usually changes from sample to sample.
+
+    Returns
+    -------
+    str
+        Empty where it does not, and where it holds levels for most of the time anyway.
+    """
+    if held_share(values) < HOLDS:
+        return ""
+    changes = np.abs(np.diff(values))
+    step = float(np.min(changes[changes > 0.0], initial=np.inf))
+    edges = np.flatnonzero(np.r_[True, changes > 0.0, True])
+    lengths = np.diff(edges)
+    # The first run has no motion before it.
+    arrival = np.r_[0.0, changes[edges[1:-1] - 1]]
+    is_hard = (lengths >= _LIMIT_RUN) & (arrival > (_STEPS_BESIDE + 0.5) * step)
+    share = float(lengths[is_hard].sum()) / values.size
+    if share < _DEAD_SHARE:
+        return ""
+    longest = edges[:-1][is_hard][np.argmax(lengths[is_hard])]
+    return (
+        f"stops at full speed and stays there for {100.0 * share:.2g} % of the time (at "
+        f"{values[longest]:.4g}), which it does in few recordings: stuck, torn off, cut at a "
+        "limit or at a stop?"
+    )
 
 
 def _ends_abruptly(values: np.ndarray, limit: float) -> bool:
@@ -138,8 +180,8 @@ def _comes_back_from_limits(values: np.ndarray, inside: np.ndarray) -> bool:
     return bool(
         visits >= _LEAST_VISITS
         and bends.size
-        and np.mean(bends > straight) > _HOLDS
-        and np.mean(moves) > _HOLDS
+        and np.mean(bends > straight) > HOLDS
+        and np.mean(moves) > HOLDS
     )
 
 

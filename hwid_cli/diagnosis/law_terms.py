@@ -193,6 +193,9 @@ def _thresholds(scales: Scales) -> Iterator[Term]:
         yield Term("Max(abs(v) - a, 0)*sign(v)", (1, -1, 0), a, "beyond a speed")
         a = {"a": (share * scales.current_A, "")}
         yield Term("Max(abs(u) - a, 0)*sign(u)", (0, 0, 1), a, "beyond an input")
+        # Eddy currents and slip: beyond a speed they brake less.
+        a = {"a": (share * scales.velocity_m_per_s, "m/s")}
+        yield Term("v/(1 + (v/a)**2)", (1, -1, 0), a, "brakes less beyond a speed")
     for share in _BENDS:
         a = {"a": (share * scales.displacement_m, "m")}
         yield Term("tanh(x/a)", (0, 0, 0), a, "levels off")

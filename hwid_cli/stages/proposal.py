@@ -9,6 +9,7 @@ import numpy as np
 
 from hwid_cli.data import column_signs as signs
 from hwid_cli.data.odd_scales import odd_scales
+from hwid_cli.data.quality import stuck_note
 from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
 from hwid_cli.errors import HwidError
 from hwid_cli.records.experiment import CalibrateOptions
@@ -26,6 +27,7 @@ from hwid_cli.stages.proposed_starts import (
     start_of_fits,
     swing_of,
 )
+from hwid_cli.stages.recording_facts import usually_moves
 
 # Words in file names, German and English; the first kind that has one of them is it.
 _KIND_WORDS = {
@@ -119,7 +121,7 @@ def propose(
             else "enough for a drive with a spring; raise them after a look"
         ),
         threshold=threshold,
-        threshold_reason=f"5 % of the usual swing of the output, {swing:.3g}{unit}",
+        threshold_reason=_threshold_reason(threshold, swing, unit),
         sample_time_s=raws[0].sample_time_s,
         exclude=tuple(glob.escape(name) for name in excluded),
         parts=parts,
@@ -127,7 +129,7 @@ def propose(
         held_out=held_out,
         held_out_reason=held_out_reason,
         names=tuple(names),
-        notes=tuple(f"{one}: {note}" for one, note in odd_scales(raws).items()),
+        notes=_doubts(raws),
         problems=tuple(problems),
         average=max(1, memory // _ENOUGH_SAMPLES),
         fit_start=start_of_fits(raws, recipes, kinds, is_cut=bool(parts)),
@@ -137,6 +139,24 @@ def propose(
 
 # What numbers recordings: digits, or one letter behind a line.
 _NUMBER = re.compile(r"[\W_]*\d+$|[\W_]+[A-Za-z]$")
+
+
+def _threshold_reason(threshold: float, swing: float, unit: str) -> str:
+    """What a threshold is of the swing, rounded as it is."""
+    if not swing > 0.0:
+        return "the output does not move"
+    share = 100.0 * threshold / swing
+    return f"about {share:.2g} % of the usual swing of the output, {swing:.3g}{unit}"
+
+
+def _doubts(raws: Sequence[RawRecording]) -> tuple[str, ...]:
+    """Recordings that may have gone wrong, beside all others."""
+    found = [f"{one}: {note}" for one, note in odd_scales(raws).items()]
+    if usually_moves(raws):
+        for raw in raws:
+            if note := stuck_note(raw.output):
+                found.append(f"{raw.name}: the output {note}")
+    return tuple(found)
 
 
 def kind_named(name: str) -> str:

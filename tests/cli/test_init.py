@@ -100,7 +100,7 @@ def test_the_configuration_is_sound_and_says_why(folder, tmp_path):
     assert "step: [Sprung*]" in text
     assert "random:" in text
     assert "step: [cut, output_offset]" in text
-    assert "5 % of the usual swing" in text
+    assert "% of the usual swing" in text
     assert "# simulation:" in text
     experiment = load_experiment(out)
     assert set(experiment.test.recordings) == {"Sprung_2"}

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from hwid_cli.data.column_clocks import guess_time, unused_times
 from hwid_cli.data.column_roles import guess_signals
@@ -497,3 +498,16 @@ def test_what_a_pump_is_told_is_its_input_where_nothing_else_is_named_one():
     )
     assert found[0] == "n_soll"
     assert found[2].reasons["input"].startswith("by its name, a command")
+
+
+def test_of_a_command_and_its_noisy_reading_the_command_is_the_input():
+    rng = np.random.default_rng(4)
+    command = np.repeat(rng.uniform(-1.0, 1.0, 40), 25)
+    output = lfilter([0.1], [1.0, -0.9], command) + 0.01 * rng.standard_normal(1000)
+    reading = 0.02 * command + 0.3 + 2e-4 * rng.standard_normal(1000)
+    columns = [
+        FoundColumn(name, name, values)
+        for name, values in (("ch.d", reading), ("ch.a", command), ("ch.b", output))
+    ]
+    found = guess_signals(columns)
+    assert (found.input.key, found.output.key) == ("ch.a", "ch.b")

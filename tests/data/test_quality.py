@@ -113,3 +113,40 @@ def test_the_peak_of_a_rounded_sine_is_no_limit(step):
     assert not [one for one in quality_notes(rounded) if "clipped" in one]
     cut = np.round(np.clip(sine, -0.8, 0.8) / step) * step
     assert len([one for one in quality_notes(cut) if "clipped" in one]) == 2
+
+
+def sensor(values, step=0.002):
+    return np.round(values / step) * step
+
+
+MOVING = sensor(
+    np.sin(np.arange(2000) * 2 * np.pi / 700) + 0.3 * np.sin(np.arange(2000) / 15)
+)
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        np.where(np.arange(2000) > 700, 13.0, MOVING),
+        np.where(np.arange(2000) > 900, MOVING[900], MOVING),
+        sensor(np.clip(MOVING, -0.1, 0.1)),
+    ],
+    ids=["torn off", "frozen", "cut"],
+)
+def test_a_sensor_that_stops_at_full_speed_is_named_where_others_move(spoilt):
+    notes = quality_notes(spoilt, others_move=True)
+    assert [one for one in notes if one.startswith("stops at full speed")]
+    # Where all recordings do so, or of an input, it is meant.
+    assert not [one for one in quality_notes(spoilt) if "full speed" in one]
+    held = quality_notes(spoilt, may_hold=True, others_move=True)
+    assert not [one for one in held if "full speed" in one]
+
+
+def test_a_motion_that_comes_to_rest_stops_by_itself():
+    t = np.arange(2000)
+    settled = sensor(np.where(t > 100, 1.0 - np.exp(-(t - 100.0) / 60), 0.0))
+    swung = sensor(
+        settled + np.where(t > 100, np.exp(-(t - 100.0) / 90) * np.sin(t / 25), 0.0)
+    )
+    for one in (settled, swung):
+        assert not quality_notes(one, others_move=True)

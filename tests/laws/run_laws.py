@@ -115,6 +115,9 @@ CASES = {
     "beyond a speed": law(
         lambda x, v, u, t, w: -10 * np.maximum(ab(v) - 0.25, 0) * sgn(v), "beyond a speed"
     ),
+    "an eddy brake": law(
+        lambda x, v, u, t, w: -14 * v / (1 + (v / 0.25) ** 2), "brakes less beyond a speed"
+    ),
     "a magnet beside the way": law(
         lambda x, v, u, t, w: 1.2 / (1 + ((x - 0.004) / 0.0015) ** 2), "peaks at a place"
     ),
