@@ -31,9 +31,7 @@ _DEAD_SHARE = 0.05
 _FAR = 50.0
 
 
-def quality_notes(
-    values: np.ndarray, *, may_hold: bool = False, others_move: bool = False
-) -> tuple[str, ...]:
+def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, ...]:
     """Say what is doubtful in a signal.
 
     Parameters
@@ -42,8 +40,6 @@ def quality_notes(
         Finite.
     may_hold : bool
         Whether long stretches without change are no fault, as in an input.
-    others_move : bool
-        Whether the same signal changes from sample to sample in most recordings.
 
     Examples
     --------
@@ -64,8 +60,6 @@ def quality_notes(
                     f"at its {word} value {limit:.4g} for {share:.2g} % of the time: "
                     "clipped?"
                 )
-    if others_move and not may_hold and (note := stuck_note(values)):
-        notes.append(note)
     if not holds:
         run = longest_run((np.diff(values) == 0) & inside[1:])
         if not may_hold and run >= _DEAD_SHARE * values.size:

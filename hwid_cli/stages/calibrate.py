@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.data.calibration import OFFSETS, Draft, removed_samples, run_recipe
-from hwid_cli.data.odd_scales import odd_scales
+from hwid_cli.data.doubtful import doubts
 from hwid_cli.data.recording_files import (
     find_files,
     missing_files_message,
@@ -286,10 +286,13 @@ def _changed(given: Measured, result: Calibrated) -> str:
 
 
 def _warnings(context: Context, given: Measured) -> list[str]:
-    """Recordings that seem to be in another unit than the others."""
+    """Recordings that seem to have gone wrong."""
     source = str(context.experiment.source)
-    odd = odd_scales(given.recordings)
-    return [f"{source}: recordings: {name}: {said}" for name, said in odd.items()]
+    return [
+        f"{source}: recordings: {name}: {said}"
+        for name, several in doubts(given.recordings).items()
+        for said in several
+    ]
 
 
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hwid_cli.data import column_signs as signs
-from hwid_cli.data.odd_scales import odd_scales
-from hwid_cli.data.quality import stuck_note
+from hwid_cli.data.doubtful import doubts
 from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
 from hwid_cli.errors import HwidError
 from hwid_cli.records.experiment import CalibrateOptions
@@ -27,7 +26,6 @@ from hwid_cli.stages.proposed_starts import (
     start_of_fits,
     swing_of,
 )
-from hwid_cli.stages.recording_facts import usually_moves
 
 # Words in file names, German and English; the first kind that has one of them is it.
 _KIND_WORDS = {
@@ -129,7 +127,9 @@ def propose(
         held_out=held_out,
         held_out_reason=held_out_reason,
         names=tuple(names),
-        notes=_doubts(raws),
+        notes=tuple(
+            f"{name}: {note}" for name, notes in doubts(raws).items() for note in notes
+        ),
         problems=tuple(problems),
         average=max(1, memory // _ENOUGH_SAMPLES),
         fit_start=start_of_fits(raws, recipes, kinds, is_cut=bool(parts)),
@@ -147,16 +147,6 @@ def _threshold_reason(threshold: float, swing: float, unit: str) -> str:
         return "the output does not move"
     share = 100.0 * threshold / swing
     return f"about {share:.2g} % of the usual swing of the output, {swing:.3g}{unit}"
-
-
-def _doubts(raws: Sequence[RawRecording]) -> tuple[str, ...]:
-    """Recordings that may have gone wrong, beside all others."""
-    found = [f"{one}: {note}" for one, note in odd_scales(raws).items()]
-    if usually_moves(raws):
-        for raw in raws:
-            if note := stuck_note(raw.output):
-                found.append(f"{raw.name}: the output {note}")
-    return tuple(found)
 
 
 def kind_named(name: str) -> str:

@@ -3,11 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from hwid_cli.data.column_signs import held_share
-from hwid_cli.data.odd_scales import odd_scales
-from hwid_cli.data.quality import HOLDS, quality_notes
+from hwid_cli.data.doubtful import doubts
+from hwid_cli.data.quality import quality_notes
 from hwid_cli.errors import HwidError
 from hwid_cli.records.check import RecordingFacts
 from hwid_cli.records.experiment import Experiment
@@ -16,8 +13,6 @@ from hwid_cli.stages.calibrate import calibrate_all
 
 # Clocks that deviate by a larger share of the sample time are worth a note, [-].
 _NOTED_JITTER = 1e-3
-# Recordings that tell how a signal usually is.
-_FEWEST_USUAL = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +49,11 @@ def check_recordings(
         Samples that the file lacks, by name.
     """
     facts, recordings, logs, problems = [], [], [], []
-    odd, others_move = odd_scales(raws), usually_moves(raws)
+    doubtful = doubts(raws)
     for raw in raws:
         lost = missing.get(raw.name, 0)
-        n_used, notes = 0, _notes(raw, jitter.get(raw.name, 0.0), lost, others_move)
-        notes += (odd[raw.name],) if raw.name in odd else ()
+        n_used, notes = 0, _notes(raw, jitter.get(raw.name, 0.0), lost)
+        notes += doubtful.get(raw.name, ())
         try:
             (recording,), (log,) = calibrate_all([raw], experiment.calibrate)
         except HwidError as error:
@@ -97,18 +92,12 @@ def _two_digits(number: float) -> str:
     return f"{float(f'{number:.2g}'):.15g}"
 
 
-def usually_moves(raws: Sequence[RawRecording]) -> bool:
-    """Whether the output changes from sample to sample in most recordings."""
-    held = [held_share(one.output) for one in raws]
-    return len(held) >= _FEWEST_USUAL and float(np.median(held)) < HOLDS
-
-
-def _notes(
-    raw: RawRecording, jitter: float, lost: int, others_move: bool
-) -> tuple[str, ...]:
-    notes = [f"input {note}" for note in quality_notes(raw.input, may_hold=True)]
-    of_output = quality_notes(raw.output, others_move=others_move)
-    notes += [f"output {note}" for note in of_output]
+def _notes(raw: RawRecording, jitter: float, lost: int) -> tuple[str, ...]:
+    notes = [
+        f"{side} {note}"
+        for side, values in (("input", raw.input), ("output", raw.output))
+        for note in quality_notes(values, may_hold=side == "input")
+    ]
     if jitter > _NOTED_JITTER:
         notes.append(
             f"the clock jitters by up to {_two_digits(100 * jitter)} % of a step"

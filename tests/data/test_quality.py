@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from hwid_cli.data.quality import longest_run, quality_notes
+from hwid_cli.data.doubtful import doubts
+from hwid_cli.data.quality import longest_run, quality_notes, stuck_note
+from hwid_cli.records.recordings import RawRecording
 
 T = np.arange(1000) / 1000
 WAVE = np.sin(2 * np.pi * 3 * T) + 0.01 * np.random.default_rng(1).standard_normal(1000)
@@ -134,19 +136,21 @@ MOVING = sensor(
     ids=["torn off", "frozen", "cut"],
 )
 def test_a_sensor_that_stops_at_full_speed_is_named_where_others_move(spoilt):
-    notes = quality_notes(spoilt, others_move=True)
-    assert [one for one in notes if one.startswith("stops at full speed")]
-    # Where all recordings do so, or of an input, it is meant.
-    assert not [one for one in quality_notes(spoilt) if "full speed" in one]
-    held = quality_notes(spoilt, may_hold=True, others_move=True)
-    assert not [one for one in held if "full speed" in one]
+    def recordings(*outputs):
+        inputs = np.arange(2000.0)
+        return [RawRecording(f"r{n}", inputs, y, 1e-3) for n, y in enumerate(outputs)]
+
+    found = doubts(recordings(MOVING, MOVING[::-1], spoilt))
+    assert list(found) == ["r2"]
+    assert found["r2"][0].startswith("the output stops at full speed")
+    # Where most do so, or too few tell what is usual, it is meant.
+    assert not doubts(recordings(MOVING, spoilt, spoilt))
+    assert not doubts(recordings(MOVING, spoilt))
 
 
 def test_a_motion_that_comes_to_rest_stops_by_itself():
     t = np.arange(2000)
     settled = sensor(np.where(t > 100, 1.0 - np.exp(-(t - 100.0) / 60), 0.0))
-    swung = sensor(
-        settled + np.where(t > 100, np.exp(-(t - 100.0) / 90) * np.sin(t / 25), 0.0)
-    )
-    for one in (settled, swung):
-        assert not quality_notes(one, others_move=True)
+    swing = np.exp(-(t - 100.0) / 90) * np.sin(t / 25)
+    swung = sensor(settled + np.where(t > 100, swing, 0.0))
+    assert [stuck_note(one) for one in (settled, swung, MOVING)] == ["", "", ""]
