@@ -2,7 +2,6 @@
 
 import json
 import logging
-import shlex
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from hashlib import sha256
@@ -192,5 +191,5 @@ def read_stored(session: Session) -> StoredResults:
         thesis_names=experiment.thesis_names,
         order=experiment.order,
         chosen_maps=read_chosen_maps(session.out),
-        arguments=shlex.join(session.arguments),
+        source=Path(experiment.source).name,
     )

@@ -8,6 +8,7 @@ import logging
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -263,6 +264,9 @@ def _warn_of_unused_kinds(
 ) -> None:
     """Say which patterns are on no recording: those that were meant have another recipe."""
     for kind, pattern in unmatched_kinds(parts, options.kind):
+        if any(fnmatchcase(pattern, one) for one in options.exclude):
+            # What was left out later is still listed there.
+            continue
         _log.warning(
             "%s: recordings.kind.%s: %r matches no recording; expected a pattern on a "
             "recording's name, such as %r",

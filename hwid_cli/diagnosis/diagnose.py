@@ -579,8 +579,11 @@ def _judged(searched: _Searched, options: DiagnoseOptions) -> Findings:
         given_sse=given_sse, base=base, before=before, force=force, where=where,
         found=found, verdict=verdict,
     )  # fmt: skip
-    # Where a drive stands for another simulation, that one judges.
-    if is_lost(criteria, verdict, base) and seeds and criteria.standing is None:
+    # Pieces were asked, and whole recordings leave much, whatever they name: it may be what
+    # the noise of their starts grows to. Where a drive stands for another simulation, that
+    # one judges.
+    is_far = criteria.ratio(verdict.chosen) > STILL_LARGE
+    if is_far and seeds and criteria.standing is None:
         judged = judged_in_pieces(rounds, whole, seeds, searched.smoothed)
         if judged is not None:
             return judged

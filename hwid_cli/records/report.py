@@ -67,8 +67,8 @@ class StoredResults:
         Section of the configuration; None takes its defaults.
     chosen_maps : ChosenMaps or None
         What ``hwid order`` has left.
-    arguments : str
-        What follows a command for this configuration and its folders, as a shell takes it.
+    source : str
+        Name of the configuration's file: the same page wherever it lies.
     """
 
     name: str
@@ -80,7 +80,7 @@ class StoredResults:
     thesis_names: bool = False
     order: OrderOptions | None = None
     chosen_maps: ChosenMaps | None = None
-    arguments: str = "CONFIG"
+    source: str = "CONFIG"
 
     @property
     def recordings(self) -> tuple[Recording, ...]:

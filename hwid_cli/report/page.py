@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import partial
+from shlex import quote
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -230,11 +231,11 @@ def to_copy(command: str, stored: StoredResults) -> str:
 
     Examples
     --------
-    >>> stored = StoredResults("a", "{}", "poles", arguments="a.yaml --out b")
+    >>> stored = StoredResults("a", "{}", "poles", source="the axis.yaml")
     >>> to_copy("hwid export CONFIG --diagnosis", stored)
-    'hwid export a.yaml --out b --diagnosis'
+    "hwid export 'the axis.yaml' --diagnosis"
     """
-    return command.replace("CONFIG", stored.arguments)
+    return command.replace("CONFIG", quote(stored.source))
 
 
 def collapsed_beyond(most: int, table: Table, summary: str) -> Table | Collapsible:

@@ -181,7 +181,7 @@ def report_key(stored: StoredResults) -> str:
         "stages": [str(run) for run in stored.stages],
         "diagnosis": json.dumps(stored.diagnosis, sort_keys=True),
         "maps": str(stored.chosen_maps),
-        "arguments": stored.arguments,
+        "source": stored.source,
     }
     return task_key("report", 1, settings, ())
 

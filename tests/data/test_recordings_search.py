@@ -170,16 +170,19 @@ def test_a_point_in_a_number_does_not_part_the_name_of_a_table(tables, names):
 
 
 def test_a_pattern_of_a_kind_that_no_recording_has_is_named_by_check(tmp_path, caplog):
-    for n in range(2):
+    for n in range(3):
         rows = np.random.default_rng(n).normal(size=(300, 2))
         np.savetxt(tmp_path / f"step_{n}.csv", rows, delimiter=",")
     config = tmp_path / "e.yaml"
     config.write_text(
         "name: e\nrecordings: {files: ['*.csv'], sample_time_s: 0.01,\n"
-        "  columns: {input: 0, output: 1}, kind: {step: ['step_0', 'stp_*']}}\n"
+        "  columns: {input: 0, output: 1}, kind: {step: ['step_0', 'stp_*', 'step_2']},\n"
+        "  exclude: [step_2]}\n"
         "orders: {nb: [1], nk: [1]}\n"
     )
     CliRunner().invoke(main, ["check", str(config), "--no-timing"])
     said = caplog.text
     assert "recordings.kind.step: 'stp_*' matches no recording" in said
     assert "'step_0' matches" not in said
+    # Left out on purpose.
+    assert "'step_2' matches" not in said

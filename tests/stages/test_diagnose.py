@@ -295,6 +295,7 @@ def test_the_stages_are_announced(with_friction):
         ("forecasts", 3),
         ("single effects, screening", 3),
         ("single effects", 3),
+        ("single effects, with the noise of the input", 2),
         # The best one, without it, and the other two.
         ("the command held", 4),
         ("verdict", 0),

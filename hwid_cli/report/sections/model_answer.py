@@ -216,13 +216,13 @@ def _recommended_maps(found: ModelAnswer) -> str:
         map_words(maps.output_map, maps.output_units),
     )
     text = f" Recommended maps: {pair[0]} and {pair[1]}"
-    if found.own_maps:
+    if found.is_linear_better:
+        text += " (chosen on other recordings than those that judge here)"
+    elif found.own_maps:
         text += (
             ", for models of one recording; those of this model came closest to recordings "
             "left out of it in turn"
         )
-    elif found.is_linear_better:
-        text += " (chosen on other recordings than those that judge here)"
     return f"{text}."
 
 
