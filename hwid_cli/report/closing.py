@@ -109,8 +109,8 @@ def spoilt_sentence(spoilt: SpoiltJoin, unit: str) -> str:
     Examples
     --------
     >>> said = spoilt_sentence(SpoiltJoin("a+b+c/1/2", 0.4, 0.1, "b"), "V")
-    >>> print(*said.split()[-8:])
-    and leave it out if it went wrong (recordings.exclude)
+    >>> print(said.rpartition("; ")[2])
+    look at it, and leave it out if it went wrong (recordings.exclude)
     """
     count = counted(spoilt.model.count("+") + 1, "recording")
     joined, single = (with_unit(one, unit) for one in (spoilt.rmsd, spoilt.single_rmsd))
