@@ -266,8 +266,8 @@ def why_other_orders(name: str, own: tuple[int, int], advised: tuple[int, int]) 
     if own == advised:
         return ""
     return (
-        f"{name} has {own[0]}/{own[1]}: it is chosen as one model, by recordings beside its "
-        "own; these orders do well on average over the models of all recordings"
+        f"{name} has {own[0]}/{own[1]}, chosen by other recordings; those are best on the "
+        "average of all models"
     )
 
 

@@ -194,13 +194,14 @@ def _orders(found: ModelAnswer, nk_role: str) -> str:
         f"Recommended for new fits: nb = {one.nb}, nk = {one.nk} "
         f"{NK_WORDS.get(nk_role, nk_role)}"
     )
-    if (one.best_nb, one.best_nk) != (one.nb, one.nk):
+    why = why_other_orders("this model", found.place, (one.nb, one.nk))
+    if why and found.is_usable and not found.is_linear_better:
+        text += f" ({why})"
+    elif (one.best_nb, one.best_nk) != (one.nb, one.nk):
         text += (
             f" (the smallest within {100 * (one.evidence.factor - 1):.2g} % of the best, "
             f"{one.best_nb}/{one.best_nk})"
         )
-    if why := why_other_orders("This model", found.place, (one.nb, one.nk)):
-        text += f". {why}"
     return f"{text}.{_at_these(found)}{_recommended_maps(found)}"
 
 
