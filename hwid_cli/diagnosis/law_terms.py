@@ -16,6 +16,8 @@ from hwid_cli.drive.formula import evaluate, names, parsed
 # Shares of the largest displacement and velocity at which a law may set in.
 _PLACES = (0.3, 0.5, 0.7)
 _SPEEDS = (0.3, 0.6)
+# The same of a speed beyond which a brake holds less.
+_BRAKE = 0.5
 # The same at which a force levels off.
 _BENDS = (0.15, 0.4)
 # The same at which it peaks, to either side, and how wide a peak is.
@@ -193,9 +195,10 @@ def _thresholds(scales: Scales) -> Iterator[Term]:
         yield Term("Max(abs(v) - a, 0)*sign(v)", (1, -1, 0), a, "beyond a speed")
         a = {"a": (share * scales.current_A, "")}
         yield Term("Max(abs(u) - a, 0)*sign(u)", (0, 0, 1), a, "beyond an input")
-        # Eddy currents and slip: beyond a speed they brake less.
-        a = {"a": (share * scales.velocity_m_per_s, "m/s")}
-        yield Term("v/(1 + (v/a)**2)", (1, -1, 0), a, "brakes less beyond a speed")
+    # Eddy currents and slip: beyond a speed they brake less. One start alone: two such terms
+    # together follow any curve, and a small speed imitates dry friction.
+    a = {"a": (_BRAKE * scales.velocity_m_per_s, "m/s")}
+    yield Term("v/(1 + (v/a)**2)", (1, -1, 0), a, "brakes less beyond a speed")
     for share in _BENDS:
         a = {"a": (share * scales.displacement_m, "m")}
         yield Term("tanh(x/a)", (0, 0, 0), a, "levels off")
