@@ -353,8 +353,8 @@ class SpoiltJoin:
     model : str
         The joined one.
     rmsd, single_rmsd : float, [output unit]
-        Geometric means over the recordings that the single one has not seen, those for the
-        test apart; the joined one was fitted to them.
+        Geometric means over the joined one's own recordings that the single one has not
+        seen.
     suspect : str
         Recording that no model of another one predicts and whose model predicts no other
         one; empty where none stands out.

@@ -11,7 +11,7 @@ from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.groups import SpoiltJoin
 from hwid_cli.records.next import NextRecordings
 from hwid_cli.records.order import MapAdvice, OrderAdvice
-from hwid_cli.report.final_test import joining_sentence
+from hwid_cli.report.final_test import joining_clause
 from hwid_cli.report.formats import counted, listed, share_text, with_unit
 from hwid_cli.report.map_words import fit_keys, map_words
 from hwid_cli.report.orders import axes_to_widen, delay_keys
@@ -99,16 +99,16 @@ def best_model_sentences(best: BestModel) -> list[str]:
         maps = " and ".join(map_words(*one) for one in best.own_maps)
         said.append(f"its maps, {maps}, come closest to recordings left out in turn")
     if best.spoilt is not None:
-        said.append(spoilt_sentence(best.spoilt, best.unit))
+        said.append(spoilt_clause(best.spoilt, best.unit))
     return [*said, *_beside(best)]
 
 
-def spoilt_sentence(spoilt: SpoiltJoin, unit: str) -> str:
+def spoilt_clause(spoilt: SpoiltJoin, unit: str) -> str:
     """Say why no joined model is taken, and which recording may have spoilt it.
 
     Examples
     --------
-    >>> said = spoilt_sentence(SpoiltJoin("a+b+c/1/2", 0.4, 0.1, "b"), "V")
+    >>> said = spoilt_clause(SpoiltJoin("a+b+c/1/2", 0.4, 0.1, "b"), "V")
     >>> print(said.rpartition("; ")[2])
     look at it, and leave it out if it went wrong (recordings.exclude)
     """
@@ -139,14 +139,14 @@ def _beside(best: BestModel) -> list[str]:
                 f"{best.linear_ratio:.2g} times as much as that"
             )
     if best.singles is not None:
-        joining = joining_sentence(best.rmsd, best.singles, best.unit)
-        said += [one[:1].lower() + one[1:].rstrip(".") for one in joining]
-    if narrow := narrow_band_sentence(best.held):
+        joining = joining_clause(best.rmsd, best.singles, best.unit)
+        said += [joining] if joining else []
+    if narrow := narrow_band_clause(best.held):
         said.append(narrow)
     return said
 
 
-def narrow_band_sentence(held: Sequence[tuple[str, float]]) -> str:
+def narrow_band_clause(held: Sequence[tuple[str, float]]) -> str:
     """Warn where a band of 90 % holds far less on recordings that nothing has used.
 
     Parameters
@@ -161,7 +161,7 @@ def narrow_band_sentence(held: Sequence[tuple[str, float]]) -> str:
 
     Examples
     --------
-    >>> print(*narrow_band_sentence([("a", 0.59), ("b", 0.8)]).split())
+    >>> print(*narrow_band_clause([("a", 0.59), ("b", 0.8)]).split())
     do not rely on its band of 90 %: it holds 70 % of the recordings never used, 59 % of a
     """
     if not held:
@@ -266,8 +266,8 @@ def why_other_orders(name: str, own: tuple[int, int], advised: tuple[int, int]) 
     if own == advised:
         return ""
     return (
-        f"{name} has {own[0]}/{own[1]}, chosen by other recordings; those are best on the "
-        "average of all models"
+        f"{name} has {own[0]}/{own[1]}, chosen by other recordings; those are as good as any "
+        "on average"
     )
 
 

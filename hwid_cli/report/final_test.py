@@ -8,7 +8,14 @@ import numpy as np
 
 from hwid_cli.records.groups import ChainTrend, FinalTest, Prediction, SingleModels
 from hwid_cli.records.units import behind
-from hwid_cli.report.formats import MISSING, counted, decimals, number, with_unit
+from hwid_cli.report.formats import (
+    MISSING,
+    as_sentence,
+    counted,
+    decimals,
+    number,
+    with_unit,
+)
 from hwid_cli.report.table import Cell, Column, Row, Table, Text, numbers, texts
 
 # Published tables of the chain on all recordings of a kind.
@@ -70,10 +77,11 @@ def _joining_note(final: FinalTest, trend: ChainTrend) -> tuple[str, ...]:
     """Whether joining recordings helped; empty where the winner is no group."""
     if trend.singles is None or not trend.models or "+" not in trend.models[-1]:
         return ()
-    return joining_sentence(trend.tested_rmsd[-1], trend.singles, final.unit)
+    found = joining_clause(trend.tested_rmsd[-1], trend.singles, final.unit)
+    return (as_sentence(found),) if found else ()
 
 
-def joining_sentence(rmsd: float, singles: SingleModels, unit: str) -> tuple[str, ...]:
+def joining_clause(rmsd: float, singles: SingleModels, unit: str) -> str:
     """Say whether joining recordings helped on those that nothing has used.
 
     Parameters
@@ -83,23 +91,23 @@ def joining_sentence(rmsd: float, singles: SingleModels, unit: str) -> tuple[str
 
     Returns
     -------
-    tuple of str
+    str
         Empty where one of both RMSDs is not known.
 
     Examples
     --------
-    >>> said = joining_sentence(0.1, SingleModels("b/1/2", 0.2, "b/1/2", 0.2), "m")
-    >>> print(*said[0].split())
-    Joining recordings helps here: b/1/2, the single model chosen in the same way, leaves 0.2 m.
+    >>> said = joining_clause(0.1, SingleModels("b/1/2", 0.2, "b/1/2", 0.2), "m")
+    >>> print(*said.split())
+    joining recordings helps here: b/1/2, the single model chosen in the same way, leaves 0.2 m
     """
     if not (np.isfinite(rmsd) and np.isfinite(singles.chosen_rmsd)):
-        return ()
+        return ""
     helps = "helps" if rmsd < singles.chosen_rmsd else "does not help"
     chosen, nearest = (
         with_unit(one, unit) for one in (singles.chosen_rmsd, singles.nearest_rmsd)
     )
     said = (
-        f"Joining recordings {helps} here: {singles.chosen}, the single model chosen in "
+        f"joining recordings {helps} here: {singles.chosen}, the single model chosen in "
         f"the same way, leaves {chosen}"
     )
     if singles.nearest_rmsd < min(rmsd, singles.chosen_rmsd):
@@ -107,7 +115,7 @@ def joining_sentence(rmsd: float, singles: SingleModels, unit: str) -> tuple[str
             f"; {singles.nearest} happens to be nearer, {nearest}, which only the test "
             "recordings can tell"
         )
-    return (f"{said}.",)
+    return said
 
 
 def chain_coverage_table(

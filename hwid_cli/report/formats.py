@@ -126,3 +126,14 @@ def listed(names: Sequence[str], most: int = _MOST_NAMED) -> str:
     if len(names) < 2:
         return "".join(names)
     return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def as_sentence(clause: str) -> str:
+    """A clause as a sentence of its own.
+
+    Examples
+    --------
+    >>> as_sentence("joining recordings helps")
+    'Joining recordings helps.'
+    """
+    return f"{clause[:1].upper()}{clause[1:]}."

@@ -5,7 +5,6 @@ The choice never looks at the recordings of the final test: those say how good i
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -67,6 +66,7 @@ def model_answer(
     deviation, percent = _scores(found.model, unseen)
     linear = beside.fit.model if beside else None
     linear_deviation, linear_percent = _scores(linear, unseen)
+    visited = _visited(found, stored.recordings)
     answer = ModelAnswer(
         name=name,
         model=found.model,
@@ -81,18 +81,17 @@ def model_answer(
         linear_rmsd=linear_deviation,
         fit_percent=percent,
         linear_fit_percent=linear_percent,
-        **_reach(found, stored.recordings, unseen),
+        input_range=visited,
+        beyond=np.array([_beyond(visited, one) for one in unseen]),
         unit=stored.recordings[0].output_unit,
         threshold=_threshold(crossval or final),
         advice=advice,
         place=grid_place(found, stored.nk_role),
-        held=() if final is None else held_by(name, final),
-        spoilt=None if final is None else spoilt_join(final, stored.recordings),
         noise_rms=differences_rms([one.output for one in unseen], 0.0) or np.nan,
     )
     answer = _with_maps(answer, found, fits, _maps(stored, advice))
-    name = _at(advice, found, named, stored.nk_role)
-    return _with_advised(answer, name, named.get(name), unseen)
+    at = _at(advice, found, named, stored.nk_role)
+    return _with_test(_with_advised(answer, at, named.get(at), unseen), stored)
 
 
 def _with_maps(
@@ -102,6 +101,15 @@ def _with_maps(
     own = own_maps(found, fits.values())
     has_them = bool(own) or _has_maps(found, maps)
     return replace(answer, maps=maps, has_these_maps=has_them, own_maps=own)
+
+
+def _with_test(answer: ModelAnswer, stored: StoredResults) -> ModelAnswer:
+    """The answer with what the final test says of its band, and of a joined model."""
+    final = stored.final_test
+    if final is None:
+        return answer
+    spoilt = spoilt_join(final, stored.recordings)
+    return replace(answer, held=held_by(answer.name, final), spoilt=spoilt)
 
 
 def _threshold(judged: CrossValidation | FinalTest | None) -> float:
@@ -215,15 +223,6 @@ def _scores(
     ]
     values = np.array(both).reshape(-1, 2)
     return values[:, 0], values[:, 1]
-
-
-def _reach(
-    found: Fit, recordings: Sequence[Recording], unseen: Sequence[Recording]
-) -> dict[str, Any]:
-    """What the input has visited in the fit, and how far others go beyond."""
-    visited = _visited(found, recordings)
-    beyond = np.array([_beyond(visited, one) for one in unseen])
-    return {"input_range": visited, "beyond": beyond}
 
 
 def _visited(found: Fit, recordings: Sequence[Recording]) -> tuple[float, float]:

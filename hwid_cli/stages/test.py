@@ -459,8 +459,8 @@ def _is_beaten(final: FinalTest, joined: int, single: int) -> bool:
 
 
 def _both_off(final: FinalTest, joined: int, single: int) -> tuple[float, float]:
-    """Geometric mean RMSD of both over what the single one has not seen, tests apart."""
-    is_judge = ~np.isin(final.recordings, final.tested_on) & ~final.is_own[single]
+    """Geometric mean RMSD of both over the joined one's own that the single has not seen."""
+    is_judge = final.is_own[joined] & ~final.is_own[single]
     if not is_judge.any():
         return np.nan, np.nan
     # An RMSD of zero is the best there is.
@@ -497,14 +497,12 @@ def _suspect(final: FinalTest, recordings: Sequence[Recording]) -> str:
     is_single = final.is_own.sum(axis=1) == 1
     apart = {}
     for place in known:
-        of_it, others = (
-            is_single & final.is_own[:, place],
-            [n for n in known if n != place],
-        )
-        by_others = share[is_single & ~final.is_own[:, place], place]
+        of_it = is_single & final.is_own[:, place]
+        by_others = share[is_single & ~of_it, place]
+        others = [n for n in known if n != place]
         if of_it.any() and others and by_others.size:
-            off = (by_others.min(), share[of_it][:, others].min())
-            apart[final.recordings[place]] = min(off)
+            off = min(by_others.min(), share[of_it][:, others].min())
+            apart[final.recordings[place]] = float(off)
     if len(apart) < _FEWEST_JOINED:
         return ""
     worst = max(apart, key=lambda name: apart[name])

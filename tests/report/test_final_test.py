@@ -11,9 +11,10 @@ from hwid_cli.report.final_test import (
     chain_tables,
     coverage_matrix_table,
     gap_sentences,
-    joining_sentence,
+    joining_clause,
     trend_sentence,
 )
+from hwid_cli.report.formats import as_sentence
 from hwid_cli.report.table import as_text
 from hwid_cli.stages.test import chain_trend
 from tests.stages.final_test_examples import KINDS, example_final_test
@@ -36,8 +37,8 @@ def test_the_chain_on_the_tests_shows_each_rmsd_and_the_mean():
     values = FINAL.rmsd[-1][[FINAL.recordings.index(n) for n in FINAL.tested_on]]
     shown = last.replace("*", "").split()
     assert shown == [WINNER, *(f"{v:.2e}" for v in [*values, np.mean(values)])]
-    joined = joining_sentence(TREND.tested_rmsd[-1], TREND.singles, FINAL.unit)
-    said = " ".join([trend_sentence(TREND), *joined])
+    joined = joining_clause(TREND.tested_rmsd[-1], TREND.singles, FINAL.unit)
+    said = " ".join([trend_sentence(TREND), as_sentence(joined)])
     assert " ".join(text.split()).endswith(" ".join(said.split()))
     alone = next(line for line in text.splitlines() if line.startswith("step_11/4/7"))
     assert alone.split()[-1] == f"{TREND.singles.chosen_rmsd:.2e}"
@@ -236,4 +237,4 @@ def test_joining_is_said_to_help_only_where_it_does():
     assert "Joining" not in said(alone)
     assert "Joining" not in said(replace(group, singles=None))
     unknown = replace(singles, chosen_rmsd=float("nan"))
-    assert joining_sentence(0.1, unknown, "m") == ()
+    assert joining_clause(0.1, unknown, "m") == ""

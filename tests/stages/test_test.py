@@ -301,6 +301,16 @@ def test_a_joined_model_that_its_own_recordings_refuse_is_not_taken():
     assert spoilt_join(sound, ()) is None
 
 
+def test_only_its_own_recordings_refuse_a_joined_model():
+    # d is none of its own: that a single model is nearer there says nothing of the join.
+    table = joined_and_singles(own_of_joined=0.2, unseen_of_single=0.3)
+    is_own, rmsd = table.is_own.copy(), table.rmsd.copy()
+    is_own[4, 3] = False
+    rmsd[4, 3] = 50.0
+    found = replace(table, is_own=is_own, rmsd=rmsd)
+    assert found.models[taken_model(found)] == "a+b+c+d/1/1"
+
+
 def test_the_recording_that_nothing_predicts_and_that_predicts_nothing_is_named():
     rng = np.random.default_rng(3)
     recordings = [

@@ -20,12 +20,12 @@ from hwid_cli.report.closing import (
     NEXT_KEYS,
     UNDECIDED_MAPS,
     linear_is,
-    narrow_band_sentence,
-    spoilt_sentence,
+    narrow_band_clause,
+    spoilt_clause,
     why_other_orders,
 )
 from hwid_cli.report.dots import Dot, DotGroup, DotRow, Dots
-from hwid_cli.report.formats import counted, listed, with_unit
+from hwid_cli.report.formats import as_sentence, counted, listed, with_unit
 from hwid_cli.report.map_words import fit_keys, map_words
 from hwid_cli.report.page import Answer, PageBlock, marked_if_changed
 from hwid_cli.report.simulation_note import simulation_note
@@ -169,8 +169,7 @@ def _model(found: ModelAnswer) -> str:
             f"{with_unit(found.threshold, found.unit)}."
         )
     if found.spoilt is not None:
-        said = spoilt_sentence(found.spoilt, found.unit)
-        text += f" {said[:1].upper()}{said[1:]}."
+        text += f" {as_sentence(spoilt_clause(found.spoilt, found.unit))}"
     return text + _noise(found) + _spread(found)
 
 
@@ -260,8 +259,8 @@ def _trust(found: ModelAnswer) -> str:
             f"{100 * float(found.beyond[worst]):.0f}\N{NO-BREAK SPACE}% of its samples"
         )
     text += "."
-    if narrow := narrow_band_sentence(found.held):
-        text += f" {narrow[:1].upper()}{narrow[1:]}."
+    if narrow := narrow_band_clause(found.held):
+        text += f" {as_sentence(narrow)}"
     return text
 
 
