@@ -22,7 +22,7 @@ from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence
 from hwid_cli.diagnosis.selection import LEAST_GAIN
-from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
+from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator, most_runs
 from hwid_cli.diagnosis.single_effects import ToldByRuns, single_in_simulation
 from hwid_cli.diagnosis.stand_in import change_between
 from hwid_cli.diagnosis.standing import its_own, standing_beside
@@ -73,7 +73,7 @@ def diagnose_foreign(
         Computes tasks, runs of the simulation among them, or takes their results from
         where it kept them.
     """
-    counted = CountedRuns(run_tasks, options.max_runs)
+    counted = CountedRuns(run_tasks, most_runs(options.max_runs, len(recordings)))
     on_round = counted.told(on_round)
     held_out = held_out_of(recordings, options)
     problem = prepare(recordings, its_own(simulator), options, held_out)

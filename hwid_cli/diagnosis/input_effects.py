@@ -53,6 +53,24 @@ def with_input_effect(
     return None if turn.sse.sum() >= findings.base.sse.sum() else turn
 
 
+def run_with_input(
+    findings: Findings,
+    fit: CandidateFit,
+    runs: Runs,
+    signals: Sequence[Signals],
+    values: dict[str, float],
+) -> list[SimulatorRun] | None:
+    """Run the simulation on some recordings with its input as an effect changes it.
+
+    Parameters
+    ----------
+    values : dict of str to float
+        Parameters of the simulation.
+    """
+    search = _Search(findings, without_base(fit), runs)
+    return search.ask(signals, {**values, **search.of_effect})
+
+
 class _Search:
     """An effect on the input and the simulation's parameters as one set of values.
 
@@ -67,7 +85,7 @@ class _Search:
         self._problem = held(findings.problem)
         (self._effect,) = fit.effects
         fitted = dict(zip(fit.names, fit.values.tolist(), strict=True))
-        self._of_effect = {
+        self.of_effect = {
             str(ref): value
             for ref, value in fitted.items()
             if ref.owner == self._effect
@@ -79,18 +97,18 @@ class _Search:
         scales = self._findings.scales
         bounds = {
             name: CATALOGUE[self._effect].parameter(_name(name)).bounds(scales)
-            for name in self._of_effect
+            for name in self.of_effect
         }
         effect = {
             name: FreeParameter(value, bounds[name])
-            for name, value in self._of_effect.items()
+            for name, value in self.of_effect.items()
         }
         return {**self._runs.simulator.free, **effect}
 
     def starts(self, values: Mapping[str, float]) -> list[dict[str, float]]:
         """Where to begin: parameters as fitted and as stated, effects as found and of any size."""
         effect = CATALOGUE[self._effect].starts(self._findings.scales)
-        names = self._of_effect
+        names = self.of_effect
         sizes = [{name: one[_name(name)] for name in names} for one in effect]
         stated = self._runs.simulator.values
         return [{**of, **size} for of in (values, stated) for size in (names, *sizes)]
@@ -121,19 +139,19 @@ class _Search:
         if forces is None:
             return None
         said = float(self._fit.sse.sum())
-        fit = with_values(self._fit, _by_ref(values, self._of_effect))
+        fit = with_values(self._fit, _by_ref(values, self.of_effect))
         own = self._of_simulation(values)
         turn = Turn(self._problem, fit, own, said, at_force=False)
         return begun_with(turn, self._runs, own, forces)
 
     def _forces(self, values: Mapping[str, float]) -> list[np.ndarray] | None:
-        fit = with_values(self._fit, _by_ref(values, self._of_effect))
+        fit = with_values(self._fit, _by_ref(values, self.of_effect))
         point = rebuilt(self._problem, fit, self._findings.scales)
         forces = forces_along(self._problem, simulate_at(self._problem, *point))
         return forces if all(np.isfinite(one).all() for one in forces) else None
 
     def _of_simulation(self, values: Mapping[str, float]) -> dict[str, float]:
-        return {k: v for k, v in values.items() if k not in self._of_effect}
+        return {k: v for k, v in values.items() if k not in self.of_effect}
 
 
 def _name(key: str) -> str:

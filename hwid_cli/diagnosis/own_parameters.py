@@ -58,16 +58,42 @@ def fit_parameters(
     return gap.at(start)
 
 
+def linearised(
+    ask: Ask,
+    signals: Sequence[Signals],
+    free: Mapping[str, FreeParameter],
+    values: dict[str, float],
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """What runs leave, and how it changes by the parameters; None where no run is possible.
+
+    Returns
+    -------
+    ndarray, shape (n_evaluated,), [output unit]
+        Errors of all recordings in a row.
+    ndarray, shape (n_evaluated, n_free), [output unit]
+        Their derivatives by each parameter over its size.
+    """
+    sizes = {name: abs(one.value) or 1.0 for name, one in free.items()}
+    high = np.array([free[name].limits[1] / size for name, size in sizes.items()])
+    gap = _Gap(ask, signals, values, sizes, high)
+    here = np.array([values[name] / size for name, size in sizes.items()])
+    errors = gap.errors(here)
+    if not np.isfinite(errors).all():
+        return None
+    return errors, gap.slopes(here) if sizes else np.zeros((errors.size, 0))
+
+
 def cost_of(ask: Ask, signals: Sequence[Signals], values: Mapping[str, float]) -> float:
     """Sum of squares that runs leave; infinite where one gives no answer."""
     found = ask(signals, values)
     if found is None:
         return float("inf")
-    errors = _errors(signals, found)
+    errors = errors_of(signals, found)
     return float(errors @ errors)
 
 
-def _errors(signals: Sequence[Signals], found: Sequence[SimulatorRun]) -> np.ndarray:
+def errors_of(signals: Sequence[Signals], found: Sequence[SimulatorRun]) -> np.ndarray:
+    """Measured less simulated of all recordings in a row, [output unit]."""
     pairs = zip(signals, found, strict=True)
     return np.concatenate(
         [(one.compared - run.output)[one.evaluated] for one, run in pairs]
@@ -162,4 +188,4 @@ class _Gap:
         found = self._ask(self._signals, self.at(coordinates))
         if found is None:
             return np.full(self._size, np.inf)
-        return _errors(self._signals, found)
+        return errors_of(self._signals, found)

@@ -27,6 +27,9 @@ _LEAST_CHANGE = 0.1
 # A difference that should be wider by more than this is taken again.
 _CLEARLY_WIDER = 2.0
 
+# Of a diagnosis, at most, where nobody says how many: in all, or for each recording.
+_FEWEST_RUNS, _RUNS_OF_EACH = 800, 80
+
 
 def difference_for(slope: np.ndarray, errors_rms: float) -> float:
     """Width of a difference that tells a derivative, as a share of the parameter's size.
@@ -108,6 +111,19 @@ class Simulator:
     def is_extended(self) -> bool:
         """Whether something was added to it before."""
         return bool(self.effects) or not self.change.is_none
+
+
+def most_runs(given: int | None, n_recordings: int) -> int:
+    """Runs after which nothing is tried that may be left out.
+
+    Parameters
+    ----------
+    given : int or None
+        By the configuration; None means 800, or 80 for each recording if that is more.
+    """
+    if given is not None:
+        return given
+    return max(_FEWEST_RUNS, _RUNS_OF_EACH * n_recordings)
 
 
 class CountedRuns:

@@ -12,6 +12,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.input_effects import with_input_effect
+from hwid_cli.diagnosis.input_screening import likely_on_input
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED,
@@ -41,6 +42,8 @@ _LEAST_LEFT = 0.01
 # of them leaves at most.
 _MOST_ON_INPUT = 3
 _CLEARLY_LESS = 0.5
+# Effects on the input that the simulation's runs alone call likely.
+_MOST_BY_RUNS = 2
 # Squares over the least, from which on an effect is no rival of what leaves hardly anything.
 _NEAR = 3.0
 
@@ -86,38 +89,62 @@ def single_in_simulation(
     alone = _base_in_simulation(findings, runs, values)
     if alone is not None:
         return ToldByRuns(*alone, is_all=True)
-    tried: dict[tuple[str, ...], Turn] = {}
-    fits: dict[tuple[str, ...], CandidateFit] = {}
+    tried = _Tried(findings)
     likely = _likely(findings)
+    criteria, base = findings.criteria, findings.base
+    if not any(criteria.is_nearly_all(one, base) for one in likely):
+        tried.keep(_on_input_by_runs_alone(findings, runs, values))
+    _try_likely(tried, likely, runs, values, on_round)
+    tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
+    tried.keep(_on_input_through_runs(findings, runs, values, likely, tried.fits))
+    decided = _decided(findings, tried.turns, tried.fits)
+    if decided is not None:
+        told, moved = decided
+        is_all = criteria.is_nearly_all(told.verdict.chosen, base)
+        return ToldByRuns(told, moved, is_all)
+    moved = _moved_by_best(findings, tried.turns, tried.fits, values)
+    return ToldByRuns(None, moved, is_all=False, fits=tried.fits)
+
+
+class _Tried:
+    """Best runs of the simulation with each effect, and what they left."""
+
+    def __init__(self, findings: Findings) -> None:
+        self.findings = findings
+        self.turns: dict[tuple[str, ...], Turn] = {}
+        self.fits: dict[tuple[str, ...], CandidateFit] = {}
+
+    def keep(self, turns: Sequence[Turn]) -> None:
+        """Keep runs that leave less than those before with the same effect."""
+        for turn in turns:
+            fit = fit_of_run(self.findings, turn)
+            before = self.fits.get(fit.effects)
+            if before is None or fit.sse.sum() < before.sse.sum():
+                self.turns[fit.effects], self.fits[fit.effects] = turn, fit
+
+
+def _try_likely(
+    tried: _Tried,
+    likely: Sequence[CandidateFit],
+    runs: Runs,
+    values: dict[str, float],
+    on_round: OnRound,
+) -> None:
+    """Put effects that are likely beside the stand-in into the simulation, one by one."""
+    findings = tried.findings
     for place, one in enumerate(likely, 1):
+        fits = list(tried.fits.values())
         is_enough = bool(fits) and runs.run_tasks.are_spent
-        if is_enough or _is_settled_by(findings, one, list(fits.values())):
+        if is_enough or _is_settled_by(findings, one, fits):
             continue
         (effect,) = one.effects
         what = f"single effects in the simulation, {place} of {len(likely)}"
         what = f"{what}, {public_id(effect)}"
-        so_far = fits.values()
-        on_round(with_best_so_far(what, findings.criteria, so_far, findings.base), 0)
-        rival = min((fit.sse.sum() for fit in fits.values()), default=np.inf)
+        on_round(with_best_so_far(what, findings.criteria, fits, findings.base), 0)
+        rival = min((fit.sse.sum() for fit in fits), default=np.inf)
         turn = settled(findings, one, runs, values, float(rival))
         if turn is not None:
-            tried[one.effects], fits[one.effects] = turn, fit_of_run(findings, turn)
-    for turn in _twins_in_simulation(findings, runs, tried, fits):
-        fit = fit_of_run(findings, turn)
-        tried[fit.effects], fits[fit.effects] = turn, fit
-    on_input = _on_input_through_runs(findings, runs, values, likely, fits)
-    for turn in on_input:
-        fit = fit_of_run(findings, turn)
-        before = fits.get(fit.effects)
-        if before is None or fit.sse.sum() < before.sse.sum():
-            tried[fit.effects], fits[fit.effects] = turn, fit
-    decided = _decided(findings, tried, fits)
-    if decided is not None:
-        told, moved = decided
-        is_all = findings.criteria.is_nearly_all(told.verdict.chosen, findings.base)
-        return ToldByRuns(told, moved, is_all)
-    moved = _moved_by_best(findings, tried, fits, values)
-    return ToldByRuns(None, moved, is_all=False, fits=fits)
+            tried.keep([turn])
 
 
 def _twins_in_simulation(
@@ -185,6 +212,22 @@ def _on_input_through_runs(
         if turn is not None:
             found.append(turn)
             if criteria.is_complete(fit_of_run(findings, turn)):
+                break
+    return found
+
+
+def _on_input_by_runs_alone(
+    findings: Findings, runs: Runs, values: dict[str, float]
+) -> list[Turn]:
+    """Effects on the input that the simulation calls likely, whatever its stand-in says."""
+    found: list[Turn] = []
+    for one in likely_on_input(findings, runs, values)[:_MOST_BY_RUNS]:
+        turn = with_input_effect(findings, one, runs, values)
+        if turn is not None:
+            found.append(turn)
+            if findings.criteria.is_nearly_all(
+                fit_of_run(findings, turn), findings.base
+            ):
                 break
     return found
 
@@ -351,9 +394,10 @@ def _is_near(
     findings: Findings, one: CandidateFit, done: Sequence[CandidateFit]
 ) -> bool:
     """Whether the stand-in takes an effect for about as good as one that is enough."""
-    said = findings.found.fits
-    least = min(findings.criteria.excess(said[fit.effects]) for fit in done)
-    return findings.criteria.excess(one) <= WITHIN_REACH * least
+    said, excess = findings.found.fits, findings.criteria.excess
+    # Of what runs alone called likely, the stand-in may have said nothing.
+    known = [excess(said[fit.effects]) for fit in done if fit.effects in said]
+    return excess(one) <= WITHIN_REACH * min(known, default=0.0)
 
 
 def _decided(

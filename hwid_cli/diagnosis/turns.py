@@ -189,6 +189,8 @@ def best_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn:
             return replace(best, ran_away=True)
         if count >= _FEW_TURNS - 1 and best.is_far_behind:
             break
+        if runs.run_tasks.are_spent and not is_worth_it:
+            break
         if count >= _MOST_TURNS - 1 and not (is_worth_it and is_as_good(turn)):
             break
         agreed = agreed + 1 if _agrees(findings, turn) and is_as_good(turn) else 0

@@ -345,8 +345,9 @@ class DiagnoseOptions:
     laws : str
         When a formula is looked for: where all effects may be named and something is
         left, in place of the catalogue, or never.
-    max_runs : int
-        Of a simulation of one's own: after so many of them no further way is tried.
+    max_runs : int or None
+        Of a simulation of one's own: after so many of them no further way is tried; None
+        means so many as the number of recordings asks for (``most_runs``).
     own_effects : dict of str to OwnEffect
         Formulas that are tried beside the catalogue; a section of their own in a file.
     """
@@ -362,7 +363,7 @@ class DiagnoseOptions:
         None
     )
     max_effects: Annotated[int, Integer(least=0), FileLimit(1000)] = 3
-    max_runs: Annotated[int, Integer(least=1)] = 2000
+    max_runs: Annotated[int | None, StandsFor("auto", None), Integer(least=1)] = None
     laws: Annotated[str, OneOf(("auto", "only", "never"))] = "auto"
     initial_state: Annotated[str, OneOf(STARTS)] = "rest"
     skip_samples: Annotated[int, Integer(least=0)] = 0

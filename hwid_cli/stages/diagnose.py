@@ -18,6 +18,7 @@ from hwid_cli.diagnosis import diagnose as pipeline
 from hwid_cli.diagnosis.direction import ReversedInputError, reversal_sentence
 from hwid_cli.diagnosis.foreign import MOST_SEARCHES, diagnose_foreign
 from hwid_cli.diagnosis.hidden import HiddenEffect
+from hwid_cli.diagnosis.simulator import most_runs
 from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.drive.simulation import are_loops_compiled
 from hwid_cli.errors import CacheError, ConfigError
@@ -31,7 +32,7 @@ from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report.diagnosis import diagnosis_blocks
 from hwid_cli.simulations.drive import simulate_recordings
 from hwid_cli.simulations.kinds import kind_named
-from hwid_cli.stages.diagnosis_seconds import LEAST_RUNS, MOST_RUNS, time_diagnosis
+from hwid_cli.stages.diagnosis_seconds import LEAST_RUNS, time_diagnosis
 from hwid_cli.stages.diagnosis_starts import (
     moving_sentence,
     moving_starts,
@@ -70,7 +71,7 @@ from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks
 from hwid_cli.tasks.task import Task, one_thread
 
 NAME = "diagnose"
-STAGE_VERSION = 45
+STAGE_VERSION = 46
 
 _Answer = TypeVar("_Answer")
 
@@ -604,7 +605,7 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     )
     what = f"{counted(n, 'recording')} x {counted(found.n_tasks, 'effect')}"
     if found.by_runs:
-        what = f"{counted(n, 'recording')}; {LEAST_RUNS} to {MOST_RUNS} runs of the simulation"
+        what = f"{counted(n, 'recording')}; {LEAST_RUNS} to {most_runs(None, n)} runs of the simulation"
     elif not found.n_tasks:
         what = f"{counted(n, 'recording')}; no effect is looked for"
     why = "one effect is not enough and the search is repeated"

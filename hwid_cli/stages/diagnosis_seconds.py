@@ -15,6 +15,7 @@ from typing import Any
 
 from hwid_cli.diagnosis.proposals import LIKELY_PAIRS, SCREENED_ON_TOP
 from hwid_cli.diagnosis.rounds import MOST_PARENTS, MOST_SCREENINGS
+from hwid_cli.diagnosis.simulator import most_runs
 from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.records.programs import SimulatorRun
 from hwid_cli.stages.run_seconds import LOADING_SECONDS
@@ -33,8 +34,8 @@ _LAW, _LAWS = 8.0, 16
 _CONFIRMING_RUNS = 9
 # A simulation of the user's own is not run for longer to say how long it takes, [s].
 _MOST_RUN_S = 30.0
-# Runs of it that a diagnosis takes, as measured (docs/any_simulation.md), [-].
-LEAST_RUNS, MOST_RUNS = 250, 800
+# Runs of it that a diagnosis takes at least, as measured (docs/any_simulation.md), [-].
+LEAST_RUNS = 250
 
 # Drawing what was found, [s].
 _FIGURES_S = 0.7
@@ -153,13 +154,15 @@ def time_diagnosis(
         if not sampler.n_tasks:
             side_by_side = min(workers, n_recordings)
             each = sampler.run_seconds / sampler.runs / side_by_side
-            return DiagnosisTime(LEAST_RUNS * each, MOST_RUNS * each, 0, by_runs=True)
+            most = most_runs(None, n_recordings)
+            return DiagnosisTime(LEAST_RUNS * each, most * each, 0, by_runs=True)
     spent = time.process_time() - start - sampler.sampling
     confirming = most_confirming = 0.0
     if sampler.runs and sampler.n_tasks:
         each = sampler.run_seconds / sampler.runs
         confirming = _CONFIRMING_RUNS * n_recordings * each
-        most_confirming = max(confirming, (MOST_RUNS - sampler.runs) * each)
+        further = most_runs(None, n_recordings) - sampler.runs
+        most_confirming = max(confirming, further * each)
     # The user's own simulations run side by side, all at once; what comes before the
     # screening waits for each of its steps.
     running = (sampler.run_seconds + confirming) / workers

@@ -2,7 +2,9 @@
 
 from types import SimpleNamespace
 
-from hwid_cli.diagnosis.simulator import CountedRuns
+import pytest
+
+from hwid_cli.diagnosis.simulator import CountedRuns, most_runs
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.programs import SimulatorRun
 
@@ -25,3 +27,12 @@ def test_what_begins_is_told_with_the_runs_until_then():
         ("its parameters, after 1 run", 0),
         ("single effects, screening, after 3 runs", 30),
     ]
+
+
+@pytest.mark.parametrize(
+    ("given", "recordings", "most"), [(None, 4, 800), (None, 27, 2160), (50, 27, 50)]
+)
+def test_as_many_runs_as_there_are_recordings_unless_the_configuration_says(
+    given, recordings, most
+):
+    assert most_runs(given, recordings) == most

@@ -19,7 +19,7 @@ FIT = made_up(("coulomb_friction",), 100.0)
 def taken(monkeypatch):
     """Turns that are taken, of those that would leave given sums of squares."""
 
-    def of(sums, *, agrees, without=1e9, rival=np.inf):
+    def of(sums, *, agrees, without=1e9, rival=np.inf, are_spent=False):
         left = iter(sums)
         seen = []
 
@@ -35,7 +35,8 @@ def taken(monkeypatch):
         criteria = SimpleNamespace(is_complete=lambda _: False)
         first = Turn(None, FIT, {}, 100.0, at_force=True, rival=rival)
         findings = SimpleNamespace(criteria=criteria, base=base(without / 6))
-        best = best_turn(findings, first, None)
+        runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=are_spent))
+        best = best_turn(findings, first, runs)
         return len(seen), float(best.sse.sum())
 
     return of
@@ -106,6 +107,13 @@ def test_three_turns_are_enough_where_another_effect_leaves_far_less(taken):
     assert taken(falls, agrees=False, rival=20.0)[0] == 3
     # Within its reach it goes on.
     assert taken(falls, agrees=False, rival=30.0)[0] == 16
+
+
+def test_once_runs_are_spent_only_turns_follow_that_still_gain(taken):
+    slow = falling(80.0, 0.97)
+    assert taken(slow, agrees=False, are_spent=True)[0] == 2
+    assert taken(slow, agrees=False)[0] > 2
+    assert taken(falling(80.0, 0.9), agrees=False, are_spent=True)[0] == 16
 
 
 def test_derivatives_by_a_parameter_are_seen_beside_the_rounding_of_a_run():

@@ -1,0 +1,110 @@
+"""Effects on the input of simulations that no linear drive stands for."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hwid_cli import Recording
+from hwid_cli.diagnosis.foreign import diagnose_foreign
+from hwid_cli.diagnosis.simulator import Simulator
+from hwid_cli.records.experiment import DiagnoseOptions
+from hwid_cli.records.programs import Capabilities, FreeParameter, SimulatorRun
+from tests.diagnosis.test_foreign import Count
+
+N, STEP, NOISE = 600, 5.0, 1.2e-3
+GRAVITY, UPPER, LOWER = 9.81, 0.014, 0.017
+TRUE = {"gain": 1.1e-5, "upper": 3.2e-5, "lower": 3.0e-5}
+GIVEN = {"gain": 1.18e-5, "upper": 3.4e-5, "lower": 2.9e-5}
+FREE = {name: FreeParameter(one, (one / 4, 4 * one)) for name, one in GIVEN.items()}
+# That a drive in the place of the tanks takes for likely, and the truth.
+LIKELY = (
+    "supply_sag",
+    "spring_preload",
+    "sensor_quadratic",
+    "force_constant_saturation",
+    "input_dead_zone",
+)
+
+
+def level(values, volts):
+    """Level of the lower of two tanks, [m]: outlets let go with the root of the level."""
+
+    def rates(h, u):
+        first, second = (
+            values[name] * np.sqrt(2 * GRAVITY * max(one, 0.0))
+            for name, one in zip(("upper", "lower"), h, strict=True)
+        )
+        inflow = values["gain"] * max(u, 0.0)
+        return np.array([(inflow - first) / UPPER, (first - second) / LOWER])
+
+    inflow = values["gain"] * max(volts[0], 0.0)
+    h = (inflow / np.array([values["upper"], values["lower"]])) ** 2 / (2 * GRAVITY)
+    found = [h[1]]
+    for left, right in pairwise(volts.tolist()):
+        middle = 0.5 * (left + right)
+        first = rates(h, left)
+        second = rates(h + 0.5 * STEP * first, middle)
+        third = rates(h + 0.5 * STEP * second, middle)
+        last = rates(h + STEP * third, right)
+        h = np.maximum(h + STEP / 6 * (first + 2 * second + 2 * third + last), 0.0)
+        found.append(h[1])
+    return np.array(found)
+
+
+def pumped(volts, threshold):
+    return np.maximum(volts - threshold, 0.0)
+
+
+def recordings(threshold):
+    rng = np.random.default_rng(4)
+    time = STEP * np.arange(N)
+    inputs = (
+        np.repeat(rng.uniform(0.0, 8.0, 12), N // 12),
+        4.0 + 3.5 * np.sin(2 * np.pi * time / 1000.0),
+        np.interp(time, [0.0, 1000.0, 1600.0, 3000.0], [0.0, 7.5, 3.0, 0.5]),
+        np.repeat(rng.choice([1.0, 6.0], 20), N // 20),
+        np.interp(time, [0.0, 5.0, 1500.0, 1505.0], [6.5, 0.0, 0.0, 5.0]),
+    )
+    return [
+        Recording(
+            f"run_{row}", one,
+            level(TRUE, pumped(one, threshold)) + NOISE * rng.standard_normal(N),
+            STEP, kind="other", input_unit="V", output_unit="m",
+        )
+        for row, one in enumerate(inputs)
+    ]  # fmt: skip
+
+
+def simulate(request):
+    return SimulatorRun(level(request.parameters, request.input), np.zeros(0))
+
+
+def diagnosed(threshold):
+    able = Capabilities(run=True, parameters=True)
+    options = DiagnoseOptions(hold_out=("run_1",), effects=LIKELY, laws="never")
+    run = Count()
+    found = diagnose_foreign(
+        recordings(threshold), Simulator(able, simulate, {}, FREE, GIVEN), options,
+        run, lambda what, n: None,
+    )  # fmt: skip
+    return found, run.runs
+
+
+@pytest.mark.thorough
+def test_a_dead_zone_is_told_by_runs_where_no_drive_can_stand_for_the_simulation():
+    """Roots in the outlets: a dead zone and a supply that sags look alike to a drive."""
+    found, runs = diagnosed(threshold=1.62)
+    assert (found.verdict, found.complete) == ("named", True)
+    (effect,) = found.effects
+    assert effect.id == "input_dead_zone"
+    (threshold,) = effect.parameters
+    assert threshold.value == pytest.approx(1.62, abs=0.03)
+    assert found.base[0].after == pytest.approx(TRUE["gain"], rel=0.02)
+    assert runs < 800
+
+
+@pytest.mark.thorough
+def test_nothing_is_named_where_parameters_are_all_that_is_off():
+    found, _ = diagnosed(threshold=0.0)
+    assert found.verdict == "parameters"
