@@ -154,8 +154,8 @@ def time_diagnosis(
         if not sampler.n_tasks:
             side_by_side = min(workers, n_recordings)
             each = sampler.run_seconds / sampler.runs / side_by_side
-            most = most_runs(None, n_recordings)
-            return DiagnosisTime(LEAST_RUNS * each, most * each, 0, by_runs=True)
+            longest = most_runs(None, n_recordings) * each
+            return DiagnosisTime(LEAST_RUNS * each, longest, 0, by_runs=True)
     spent = time.process_time() - start - sampler.sampling
     confirming = most_confirming = 0.0
     if sampler.runs and sampler.n_tasks:
