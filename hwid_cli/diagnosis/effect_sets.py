@@ -64,7 +64,10 @@ def may_stand(effects: Effects, present: Collection[str]) -> bool:
 
 
 def relatives(effect: str) -> list[str]:
-    """Effects that an effect contains, that contain it, or that look like it."""
+    """Effects that an effect contains, that contain it, its other laws, what looks like it.
+
+    Other laws of an effect have its parameters: a curve of another shape, a sensor elsewhere.
+    """
     contained = CATALOGUE[effect].contains
     containing = [name for name, one in CATALOGUE.items() if effect in one.contains]
     alike = [
@@ -72,7 +75,15 @@ def relatives(effect: str) -> list[str]:
         for public in CATALOGUE[effect].confused_with
         if public in CATALOGUE
     ]
-    return list(dict.fromkeys((*contained, *containing, *alike)))
+    laws = [one for one in _firsts(public_id(effect)) if _has_law_of(one, effect)]
+    return list(dict.fromkeys((*contained, *containing, *laws, *alike)))
+
+
+def _has_law_of(one: str, other: str) -> bool:
+    """Whether two different effects have the same parameters, none for each recording."""
+    names = [[each.name for each in CATALOGUE[two].parameters] for two in (one, other)]
+    is_shared = not any(each.is_own for each in CATALOGUE[one].parameters)
+    return one != other and names[0] == names[1] and is_shared
 
 
 def second_of(effect: str) -> str:

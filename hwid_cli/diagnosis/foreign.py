@@ -44,6 +44,8 @@ from hwid_cli.records.recordings import Recording
 # Searches, each from where the last one has moved the parameters by more than this.
 MOST_SEARCHES = 3
 _MOVED = 0.01
+# Of all runs, those after which no further single effect is tried: sets need some, too.
+_FOR_SINGLES = 0.75
 # Verdicts that a law may take the place of.
 _NAMED = ("named", "ambiguous")
 # Factors of the stand-in that are none: as far as parameters are told, at most and at
@@ -200,7 +202,8 @@ def _found(
         found = find(
             standing, singles, runs.run_tasks, on_round, given_sse, may_cut=False
         )
-        alone = single_in_simulation(found, runs, values, on_round)
+        some = runs.up_to(_FOR_SINGLES)
+        alone = single_in_simulation(found, some, values, on_round)
         if alone.findings is not None and alone.is_all:
             return alone.findings, alone.values, True
         if is_first and have_moved(values, alone.values, _MOVED):

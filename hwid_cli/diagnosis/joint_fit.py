@@ -121,17 +121,15 @@ def pushes_of(
     A change of the output is taken for one of the force, to which the effect reacts.
     """
     drive = replace(problem.drive, effects={})
-    return [
-        np.column_stack(
-            [
-                force_of_change(
-                    drive, _moved_by(column, one), moved_as(one, run).position
-                )
-                for column in slope.T
-            ]
-        )
-        for one, slope, run in zip(problem.signals, slopes, found, strict=True)
-    ]
+    pushes = []
+    for one, slope, run in zip(problem.signals, slopes, found, strict=True):
+        position = moved_as(one, run).position
+        each = [
+            force_of_change(drive, _moved_by(column, one), position)
+            for column in slope.T
+        ]
+        pushes.append(np.array(each).reshape(-1, slope.shape[0]).T)
+    return pushes
 
 
 def _moved_by(change: np.ndarray, signals: Signals) -> Moved:

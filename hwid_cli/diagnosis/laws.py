@@ -362,16 +362,23 @@ def _renamed(text: str, name: str, new: str) -> str:
 
 def _simulated(rounds: Rounds, tried: Sequence[_Tried], what: str) -> list[_Tried]:
     """Fit effects with the base in a free run; of many samples only the best to all."""
-    what = f"{what}, in a free run"
+    found = _with_few_samples(rounds, tried, what)
     if not has_many_samples(rounds.problem):
-        return _fitted(rounds, tried, what, None)
-    found = _fitted(rounds, tried, what, _FEW_SAMPLES)
+        return found
     best = max(found, key=lambda one: rounds.criteria.gain(_fit(one), rounds.base))
     if not _fit(best).is_usable:
         return found
     again = replace(best, start=start_from(rounds.problem.drive, _fit(best)))
-    (whole,) = _fitted(rounds, [again], f"{what}, all recordings", None)
+    (whole,) = _fitted(rounds, [again], f"{what}, in a free run, all recordings", None)
     return [whole if one is best else one for one in found]
+
+
+def _with_few_samples(
+    rounds: Rounds, tried: Sequence[_Tried], what: str
+) -> list[_Tried]:
+    """Fit effects with the base in a free run, to some of many samples."""
+    most = _FEW_SAMPLES if has_many_samples(rounds.problem) else None
+    return _fitted(rounds, tried, f"{what}, in a free run", most)
 
 
 def _fitted(
@@ -507,7 +514,8 @@ def _refined(rounds: Rounds, one: _Tried) -> _Tried:
         size = _size(rounds, name)
         free = replace(free, formula=free.formula.replace("n0", f"{size:.6g}"))
         fitted = _replaced(rounds, one, place, free, size**power)
-        (fitted,) = _simulated(rounds, [fitted], "the exponent")
+        # Rounded afterwards, an exponent needs no more than some of many samples.
+        (fitted,) = _with_few_samples(rounds, [fitted], "the exponent")
         found = _value_of(fitted, "p")
         if (
             not np.isfinite(found)

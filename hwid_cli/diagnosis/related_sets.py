@@ -26,7 +26,7 @@ from hwid_cli.diagnosis.effect_sets import (
     with_effect,
     without_effect,
 )
-from hwid_cli.diagnosis.selection import LEAST_ADDED
+from hwid_cli.diagnosis.selection import LEAST_ADDED, has_own_values
 from hwid_cli.diagnosis.set_fits import (
     FAR_BEHIND,
     LEAST_LEFT,
@@ -53,6 +53,12 @@ def from_related(fits: SetFits, size: int) -> dict[Effects, list[SearchStart]]:
     if excess(lowest) < _LEADS_FURTHER * excess(best):
         # A wider law that brings too little of the whole to be preferred.
         sets = {**_from_best(fits, lowest), **sets}
+    if has_own_values(best):
+        # Values of each recording make up for much: the truth may be a relative of what
+        # comes next.
+        shared = fits.best_of_size(size, are_shared=True)
+        if shared is not None:
+            sets = {**_from_best(fits, shared), **sets}
     if not fits.rounds.criteria.is_complete(best):
         for ids, start in _from_parts(fits, size):
             sets.setdefault(ids, []).extend(fits.unless_tried(ids, [start]))

@@ -310,8 +310,11 @@ class _Search:
         rounds = self.rounds
         if runs_to_bound(rounds.problem, found, rounds.baseline.scales):
             return False
-        against = rounds.criteria.evidence(found, rounds.base)
-        return against.explained >= LEAST_OF_PARENT
+        criteria, base = rounds.criteria, rounds.base
+        if criteria.evidence(found, base).explained >= LEAST_OF_PARENT:
+            return True
+        # What is still missing may be most of what held-out recordings show.
+        return criteria.excess(found) <= (1.0 - STANDS_OUT) * criteria.excess(base)
 
     def fit_parts(self, best: list[CandidateFit]) -> None:
         """Fit each best set without each of its effects, from the largest down.

@@ -95,6 +95,7 @@ def scales_of_recordings(
         passes_once=problem.passes_once,
         way_m=problem.way_without_return,
         has_spring=natural > 2.0 / duration,
+        decay_per_s=drive.damping_N_s_per_m / drive.mass_kg,
     )
 
 

@@ -34,6 +34,7 @@ from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.selection import (
     LEAST_ADDED,
     SelectionCriteria,
+    has_own_values,
     is_part_of,
     select_best,
     with_best_so_far,
@@ -110,9 +111,14 @@ class SetFits:
         """All sets of a size."""
         return [one for one in self.found.values() if len(one.effects) == size]
 
-    def best_of_size(self, size: int) -> CandidateFit | None:
-        """The best set of a size."""
-        return select_best(self.rounds.criteria, self.of_size(size), self.rounds.base)
+    def best_of_size(
+        self, size: int, *, are_shared: bool = False
+    ) -> CandidateFit | None:
+        """The best set of a size; ``are_shared``: without values of each recording."""
+        fits = self.of_size(size)
+        if are_shared:
+            fits = [one for one in fits if not has_own_values(one)]
+        return select_best(self.rounds.criteria, fits, self.rounds.base)
 
     def fit_with_input_noise(self, size: int) -> None:
         """Fit the best sets of a size with the input's noise in mind, where that is all.

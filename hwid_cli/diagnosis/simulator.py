@@ -149,6 +149,10 @@ class CountedRuns:
         self.count += sum(one.result_type is SimulatorRun for one in tasks)
         return self._run_tasks(tasks, keep=keep)
 
+    def up_to(self, share: float) -> "CountedRuns":
+        """The same, spent after a share of all runs; what it runs counts here, too."""
+        return CountedRuns(self, share * self._most - self.count)
+
     def told(self, on_round: OnRound) -> OnRound:
         """What begins, with the runs until then."""
 
@@ -174,6 +178,10 @@ class Runs:
     simulator: Simulator
     run_tasks: CountedRuns
     starts: Mapping[str, float] = field(default_factory=dict)
+
+    def up_to(self, share: float) -> "Runs":
+        """The same, spent after a share of all runs."""
+        return replace(self, run_tasks=self.run_tasks.up_to(share))
 
     def of(
         self,

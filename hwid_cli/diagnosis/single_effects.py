@@ -93,10 +93,11 @@ def single_in_simulation(
     likely = _likely(findings)
     criteria, base = findings.criteria, findings.base
     if not any(criteria.is_nearly_all(one, base) for one in likely):
-        tried.keep(_on_input_by_runs_alone(findings, runs, values))
+        tried.keep(_on_input_by_runs_alone(tried, runs, values))
     _try_likely(tried, likely, runs, values, on_round)
     tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
-    tried.keep(_on_input_through_runs(findings, runs, values, likely, tried.fits))
+    further = [one for one in likely if one.effects not in tried.through_runs]
+    tried.keep(_on_input_through_runs(findings, runs, values, further, tried.fits))
     decided = _decided(findings, tried.turns, tried.fits)
     if decided is not None:
         told, moved = decided
@@ -113,6 +114,8 @@ class _Tried:
         self.findings = findings
         self.turns: dict[tuple[str, ...], Turn] = {}
         self.fits: dict[tuple[str, ...], CandidateFit] = {}
+        # Effects on the input that were fitted through runs.
+        self.through_runs: set[tuple[str, ...]] = set()
 
     def keep(self, turns: Sequence[Turn]) -> None:
         """Keep runs that leave less than those before with the same effect."""
@@ -134,17 +137,36 @@ def _try_likely(
     findings = tried.findings
     for place, one in enumerate(likely, 1):
         fits = list(tried.fits.values())
-        is_enough = bool(fits) and runs.run_tasks.are_spent
-        if is_enough or _is_settled_by(findings, one, fits):
+        if runs.run_tasks.are_spent and place > 1:
+            break
+        if _is_settled_by(findings, one, fits):
             continue
         (effect,) = one.effects
         what = f"single effects in the simulation, {place} of {len(likely)}"
         what = f"{what}, {public_id(effect)}"
         on_round(with_best_so_far(what, findings.criteria, fits, findings.base), 0)
-        rival = min((fit.sse.sum() for fit in fits), default=np.inf)
-        turn = settled(findings, one, runs, values, float(rival))
+        tried.keep(_in_simulation(tried, one, runs, values))
+
+
+def _in_simulation(
+    tried: _Tried, one: CandidateFit, runs: Runs, values: dict[str, float]
+) -> list[Turn]:
+    """Best runs with an effect: one on the input through runs first, which are exact."""
+    findings, found = tried.findings, []
+    is_open = one.effects not in tried.through_runs
+    if changes_input(one.effects) and runs.simulator.free and is_open:
+        tried.through_runs.add(one.effects)
+        turn = with_input_effect(findings, one, runs, values)
         if turn is not None:
-            tried.keep([turn])
+            found.append(turn)
+            fit = fit_of_run(findings, turn)
+            if findings.criteria.is_nearly_all(fit, findings.base):
+                return found
+        if runs.run_tasks.are_spent:
+            return found
+    rival = min((fit.sse.sum() for fit in tried.fits.values()), default=np.inf)
+    turn = settled(findings, one, runs, values, float(rival))
+    return found if turn is None else [*found, turn]
 
 
 def _twins_in_simulation(
@@ -217,17 +239,17 @@ def _on_input_through_runs(
 
 
 def _on_input_by_runs_alone(
-    findings: Findings, runs: Runs, values: dict[str, float]
+    tried: _Tried, runs: Runs, values: dict[str, float]
 ) -> list[Turn]:
     """Effects on the input that the simulation calls likely, whatever its stand-in says."""
-    found: list[Turn] = []
+    findings, found = tried.findings, []
     for one in likely_on_input(findings, runs, values)[:_MOST_BY_RUNS]:
+        tried.through_runs.add(one.effects)
         turn = with_input_effect(findings, one, runs, values)
         if turn is not None:
             found.append(turn)
-            if findings.criteria.is_nearly_all(
-                fit_of_run(findings, turn), findings.base
-            ):
+            fit = fit_of_run(findings, turn)
+            if findings.criteria.is_nearly_all(fit, findings.base):
                 break
     return found
 

@@ -394,7 +394,8 @@ def _slopes(
     free = runs.simulator.free.items()
     each = [_slope(push, values, (name, one), found, noise_rms) for name, one in free]
     return [
-        np.column_stack([slope[row] for slope in each]) for row in range(len(found))
+        np.array([slope[row] for slope in each]).reshape(-1, run.output.size).T
+        for row, run in enumerate(found)
     ]
 
 

@@ -131,6 +131,8 @@ class Scales:
         Of the longest recording, where none passes a place again; else 0.
     has_spring : bool
         Whether mass and spring say how fast the drive is.
+    decay_per_s : float, [1/s]
+        Damping over mass: how fast a speed dies away.
     """
 
     displacement_m: float
@@ -152,6 +154,7 @@ class Scales:
     passes_once: bool = False
     way_m: float = 0.0
     has_spring: bool = True
+    decay_per_s: float = 0.0
 
     def __post_init__(self) -> None:
         if self.reading == 0:

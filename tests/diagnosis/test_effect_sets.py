@@ -85,3 +85,13 @@ def test_in_the_place_of_a_contact_stands_another_contact():
     assert "one_sided_stop:contact" in relatives("end_stop:contact")
     assert "one_sided_stop" not in relatives("end_stop:contact")
     assert "one_sided_stop" in relatives("end_stop")
+
+
+def test_other_laws_of_an_effect_are_its_relatives():
+    iron = "force_constant_saturation:iron"
+    assert iron in relatives("force_constant_saturation")
+    assert "force_constant_saturation" in relatives(iron)
+    assert "stribeck_friction:exponential" in relatives("stribeck_friction")
+    # A second one is no other law, and values of each recording are not handed on.
+    assert "cogging:second" not in relatives("cogging")
+    assert "parameter_change:damping" not in relatives("parameter_change:mass")

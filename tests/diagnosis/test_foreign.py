@@ -620,7 +620,7 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
         foreign, "confirm", lambda found, *_: (found, {"c": 1.0}, False)
     )
     simulator = SimpleNamespace(run=simulate)
-    runs = SimpleNamespace(simulator=simulator, run_tasks=CountedRuns(None))
+    runs = Runs(simulator, CountedRuns(None))
     foreign._found(
         None, DiagnoseOptions(max_effects=3), (runs, {"c": 1.0}),
         lambda *_: None, None, is_first=False,

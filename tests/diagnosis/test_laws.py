@@ -298,7 +298,8 @@ def test_a_power_that_is_hardly_one_is_tried_as_the_sign_alone(monkeypatch):
         return SimpleNamespace(terms=(free,))
 
     monkeypatch.setattr(laws, "_replaced", replaced)
-    monkeypatch.setattr(laws, "_simulated", lambda _, several, what: several)
+    for fitted in ("_simulated", "_with_few_samples"):
+        monkeypatch.setattr(laws, fitted, lambda _, several, what: several)
     monkeypatch.setattr(laws, "_value_of", lambda one, start: 0.12)
     monkeypatch.setattr(laws, "_fit", lambda one: one)
     gain = {"sign(v)": 100.0, "abs(v)**0.12*sign(v)": 90.0}

@@ -2,14 +2,27 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from hwid_cli.diagnosis import related_sets, set_fits
 from hwid_cli.diagnosis.candidate import Screened, start_from
-from hwid_cli.diagnosis.related_sets import near_the_best, parts_of, that_add
+from hwid_cli.diagnosis.related_sets import (
+    from_related,
+    near_the_best,
+    parts_of,
+    that_add,
+)
 from hwid_cli.diagnosis.set_fits import SetFits
+from tests.diagnosis.made_up_fits import base, made_up
 from tests.diagnosis.small_drive import fit, search_start
-from tests.diagnosis.small_rounds import FEW, STIFFNESS, Screenings, rounds_of
+from tests.diagnosis.small_rounds import (
+    FEW,
+    STIFFNESS,
+    Screenings,
+    rounds_of,
+    rounds_of_fits,
+)
 from tests.stages.diagnosed_drive import FRICTION
 
 BREAKING = {"force_N": 0.5, "static_excess_N": 0.6, "velocity_m_per_s": 0.03}
@@ -101,3 +114,25 @@ def test_a_simpler_law_may_be_further_from_the_best_set_than_another_one(monkeyp
     sets = {ids: ["a"] for ids in left if ids != best.effects}
     screened = [Screened(ids, left[ids], ("a",)) for ids in sets]
     assert set(near_the_best(fits, sets, screened, best)) == {("coulomb_friction",)}
+
+
+def test_beside_values_of_each_recording_relatives_of_shared_ones_are_tried(
+    monkeypatch,
+):
+    # A magnet and iron that saturates: a gain of each recording makes up for the magnet.
+    fits = SetFits(replace(rounds_of_fits(), base=base(900.0)))
+    swallows = made_up(
+        ("force_constant_saturation", "parameter_change:damping"), 150.0, own=np.ones(6)
+    )
+    shared = made_up(("cogging", "force_constant_saturation"), 200.0)
+    fits.found = {one.effects: one for one in (swallows, shared)}
+    asked = []
+    monkeypatch.setattr(
+        related_sets, "_from_best", lambda _, best: asked.append(best) or {}
+    )
+    from_related(fits, 2)
+    assert asked == [swallows, shared]
+    fits.found = {shared.effects: shared}
+    asked.clear()
+    from_related(fits, 2)
+    assert asked == [shared]

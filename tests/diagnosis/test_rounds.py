@@ -301,6 +301,20 @@ def test_what_leads_in_pieces_is_not_told(monkeypatch, are_pieces):
     assert ("so far" in what) is not are_pieces
 
 
+@pytest.mark.parametrize(
+    ("of_training", "is_built_on"), [(150.0, True), (1500.0, False)]
+)
+def test_what_takes_most_of_all_recordings_is_built_on_whatever_held_out_ones_show(
+    of_training, is_built_on
+):
+    # Where a second effect is missing, the first one alone may be worse there.
+    left = [*[2000.0] * 3, *[130.0] * 3]
+    search = rounds._Search(replace(rounds_of_fits(), base=made_up_base(left)))
+    one = made_up(("input_saturation",), [*[of_training] * 3, *[220.0] * 3])
+    search.fits.found = {one.effects: one}
+    assert search.parents(1) == ([one] if is_built_on else [])
+
+
 def test_nothing_is_built_on_what_ran_to_its_bound(monkeypatch):
     search = rounds._Search(replace(rounds_of_fits(), base=made_up_base(900.0)))
     one, best = made_up(("end_stop",), 300.0), made_up(("torque_ripple",), 150.0)

@@ -36,3 +36,14 @@ def test_as_many_runs_as_there_are_recordings_unless_the_configuration_says(
     given, recordings, most
 ):
     assert most_runs(given, recordings) == most
+
+
+def test_some_runs_are_left_for_what_follows():
+    counted = CountedRuns(lambda tasks, *, keep: tasks, most=10)
+    run = SimpleNamespace(result_type=SimulatorRun)
+    counted([run], keep=True)
+    some = counted.up_to(0.75)
+    some([run] * 6, keep=True)
+    assert not some.are_spent
+    some([run], keep=True)
+    assert (some.are_spent, counted.are_spent, counted.count) == (True, False, 8)

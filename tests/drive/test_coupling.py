@@ -166,3 +166,12 @@ def test_the_stiffest_shaft_of_a_search_swings_once_in_two_samples():
     # Not where that is too soft to be a shaft, nor stiffer than what counts as one mass.
     assert bounds(replace(scales, sample_time_s=1.0))[1] == pytest.approx(10 * low)
     assert bounds(replace(scales, sample_time_s=5e-8))[1] == pytest.approx(2e5 * low)
+
+
+def test_no_part_of_a_mass_stops_within_a_tenth_of_a_sample():
+    bounds = CATALOGUE["elastic_coupling:load"].parameter("motor_share").bounds
+    assert bounds(replace(SCALES, decay_per_s=0.0)) == (0.02, 0.98)
+    # Two thirds of a speed are lost in half a sample: in a tenth with a fifth of the mass.
+    damped = replace(SCALES, sample_time_s=2.0, decay_per_s=1.0)
+    assert bounds(damped) == pytest.approx((0.2, 0.8))
+    assert bounds(replace(damped, decay_per_s=50.0)) == pytest.approx((0.4, 0.6))

@@ -3,6 +3,7 @@
 docs/method_diagnosis.md, eq. (D11) to (D13).
 """
 
+from collections.abc import Callable
 from math import log, pi
 
 from hwid_cli.drive.effect import (
@@ -79,6 +80,26 @@ def _teeth_bounds(scales: Scales) -> tuple[float, float]:
     return low, max(_fastest(scales), 10 * low)
 
 
+# Of a sample in which the lighter part of a mass may stop at the soonest, and the share that
+# it has at most then.
+_SETTLES, _MOST_OF_LIGHTER = 0.1, 0.4
+
+
+def _shares(least: float) -> Callable[[Scales], tuple[float, float]]:
+    """Bounds of the motor's share of the mass.
+
+    So little of a strongly damped mass that its speed dies away within a tenth of a sample
+    looks like none, and takes hundreds of steps in each.
+    """
+
+    def bounds(scales: Scales) -> tuple[float, float]:
+        settles = _SETTLES * scales.decay_per_s * scales.sample_time_s
+        low = min(max(settles, least), _MOST_OF_LIGHTER)
+        return low, 1.0 - low
+
+    return bounds
+
+
 # The load has the rest.
 _BELOW_WHOLE = Limit("a share of the mass below 1", lambda value: value < 1)
 
@@ -107,7 +128,7 @@ GEAR = Effect(
         Parameter(
             "motor_share",
             lambda scales: (0.2, 0.45),
-            lambda scales: (0.05, 0.95),
+            _shares(0.05),
             places=("MOTOR_SHARE",),
             default=0.5,
             limits=(POSITIVE, _BELOW_WHOLE),
@@ -227,7 +248,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
             Parameter(
                 "motor_share",
                 lambda scales: (0.25, 0.6),
-                lambda scales: (0.02, 0.98),
+                _shares(0.02),
                 places=("COUPLING_SHARE",),
                 default=0.5,
                 limits=(POSITIVE, _BELOW_WHOLE),
