@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hwid_cli.diagnosis.findings import Findings
-from hwid_cli.diagnosis.input_effects import with_input_effect
-from hwid_cli.diagnosis.input_screening import likely_on_input
 from hwid_cli.diagnosis.intervals import unclear_effects
+from hwid_cli.diagnosis.port_effects import with_port_effect
+from hwid_cli.diagnosis.port_screening import AtPorts, screened_at_ports
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED,
     LEAST_GAIN,
@@ -25,7 +25,7 @@ from hwid_cli.diagnosis.selection import (
 )
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
-from hwid_cli.diagnosis.stand_in import changes_input
+from hwid_cli.diagnosis.stand_in import acts_at_port, changes_input
 from hwid_cli.diagnosis.tasks import OnRound
 from hwid_cli.diagnosis.turns import Turn, fit_of_run
 from hwid_cli.diagnosis.verdict import decide
@@ -42,10 +42,8 @@ _LEAST_LEFT = 0.01
 # of them leaves at most.
 _MOST_ON_INPUT = 3
 _CLEARLY_LESS = 0.5
-# Effects on the input that the simulation's runs alone call likely.
+# Effects at its ports that the simulation's runs alone call likely: so many are fitted.
 _MOST_BY_RUNS = 2
-# Squares over the least, from which on an effect is no rival of what leaves hardly anything.
-_NEAR = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +91,9 @@ def single_in_simulation(
     likely = _likely(findings)
     criteria, base = findings.criteria, findings.base
     if not any(criteria.is_nearly_all(one, base) for one in likely):
-        tried.keep(_on_input_by_runs_alone(tried, runs, values))
+        tried.keep(_at_ports_by_runs_alone(tried, runs, values))
     _try_likely(tried, likely, runs, values, on_round)
     tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
-    further = [one for one in likely if one.effects not in tried.through_runs]
-    tried.keep(_on_input_through_runs(findings, runs, values, further, tried.fits))
     decided = _decided(findings, tried.turns, tried.fits)
     if decided is not None:
         told, moved = decided
@@ -114,8 +110,17 @@ class _Tried:
         self.findings = findings
         self.turns: dict[tuple[str, ...], Turn] = {}
         self.fits: dict[tuple[str, ...], CandidateFit] = {}
-        # Effects on the input that were fitted through runs.
+        # Effects at the ports that were fitted through runs, and what was asked before.
         self.through_runs: set[tuple[str, ...]] = set()
+        self.at_ports = AtPorts()
+
+    def is_told_by_ports(self, one: CandidateFit) -> bool:
+        """Whether runs leave nothing with another effect at a port, and much with this one."""
+        criteria, (effect,) = self.findings.criteria, one.effects
+        return any(
+            criteria.is_complete(fit) and self.at_ports.is_behind(effect, *fit.effects)
+            for fit in self.fits.values()
+        )
 
     def keep(self, turns: Sequence[Turn]) -> None:
         """Keep runs that leave less than those before with the same effect."""
@@ -139,7 +144,7 @@ def _try_likely(
         fits = list(tried.fits.values())
         if runs.run_tasks.are_spent and place > 1:
             break
-        if _is_settled_by(findings, one, fits):
+        if tried.is_told_by_ports(one) or _is_settled_by(findings, one, fits):
             continue
         (effect,) = one.effects
         what = f"single effects in the simulation, {place} of {len(likely)}"
@@ -151,12 +156,12 @@ def _try_likely(
 def _in_simulation(
     tried: _Tried, one: CandidateFit, runs: Runs, values: dict[str, float]
 ) -> list[Turn]:
-    """Best runs with an effect: one on the input through runs first, which are exact."""
+    """Best runs with an effect: one at a port through runs first, which are exact."""
     findings, found = tried.findings, []
     is_open = one.effects not in tried.through_runs
-    if changes_input(one.effects) and runs.simulator.free and is_open:
+    if acts_at_port(one.effects) and runs.simulator.free and is_open:
         tried.through_runs.add(one.effects)
-        turn = with_input_effect(findings, one, runs, values)
+        turn = with_port_effect(findings, one, runs, values)
         if turn is not None:
             found.append(turn)
             fit = fit_of_run(findings, turn)
@@ -194,58 +199,15 @@ def _twins_in_simulation(
     return [turn for turn in found if turn is not None]
 
 
-def _on_input_through_runs(
-    findings: Findings,
-    runs: Runs,
-    values: dict[str, float],
-    likely: Sequence[CandidateFit],
-    fits: Mapping[tuple[str, ...], CandidateFit],
-) -> list[Turn]:
-    """Effects on the input, fitted with the simulation's parameters, where nothing is enough.
-
-    Those that have left least come first, until one leaves nothing more.
-    """
-    criteria, base = findings.criteria, findings.base
-    done = fits.values()
-    if not runs.simulator.free:
-        return []
-    # Then only one that has not settled in the simulation may be as likely.
-    is_enough = any(criteria.is_complete(one) for one in done)
-
-    def left(one: CandidateFit) -> float:
-        # A run that leaves more than the stand-in has said has not settled.
-        return float(min(one.sse.sum(), fits.get(one.effects, one).sse.sum()))
-
-    # Beside what leaves hardly anything only another one that does so counts.
-    is_nearly_all = is_enough or any(criteria.is_nearly_all(one, base) for one in done)
-    most = _NEAR * min(one.sse.sum() for one in done) if is_nearly_all else np.inf
-    found: list[Turn] = []
-    on_input = [
-        one
-        for one in likely
-        if changes_input(one.effects)
-        and left(one) <= most
-        and not (is_enough and one.effects in fits)
-    ]
-    for one in sorted(on_input, key=left)[:_MOST_ON_INPUT]:
-        if runs.run_tasks.are_spent:
-            break
-        turn = with_input_effect(findings, one, runs, values)
-        if turn is not None:
-            found.append(turn)
-            if criteria.is_complete(fit_of_run(findings, turn)):
-                break
-    return found
-
-
-def _on_input_by_runs_alone(
+def _at_ports_by_runs_alone(
     tried: _Tried, runs: Runs, values: dict[str, float]
 ) -> list[Turn]:
-    """Effects on the input that the simulation calls likely, whatever its stand-in says."""
+    """Effects at the ports that the simulation calls likely, whatever its stand-in says."""
     findings, found = tried.findings, []
-    for one in likely_on_input(findings, runs, values)[:_MOST_BY_RUNS]:
+    tried.at_ports = screened_at_ports(findings, runs, values)
+    for one in tried.at_ports.likely[:_MOST_BY_RUNS]:
         tried.through_runs.add(one.effects)
-        turn = with_input_effect(findings, one, runs, values)
+        turn = with_port_effect(findings, one, runs, values)
         if turn is not None:
             found.append(turn)
             fit = fit_of_run(findings, turn)

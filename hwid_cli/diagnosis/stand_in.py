@@ -386,6 +386,20 @@ def changes_input(effects: Sequence[str]) -> bool:
     return bool(effects) and all(CATALOGUE[one].enters == "command" for one in effects)
 
 
+def acts_at_port(effects: Sequence[str]) -> bool:
+    """Whether effects change the input or the reading alone, each of them at once.
+
+    What needs another clock, or a value of each recording, does not.
+    """
+    entries = [CATALOGUE[one] for one in effects]
+    return bool(entries) and all(
+        one.enters in ("command", "output")
+        and not any(each.is_own for each in one.parameters)
+        and one.id != "clock_skew"
+        for one in entries
+    )
+
+
 def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarray:
     """Force beside input and stand-in force that a motion needs: what an effect makes.
 

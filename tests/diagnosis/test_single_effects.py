@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis import single_effects
+from hwid_cli.diagnosis.port_screening import AtPorts
 from hwid_cli.diagnosis.single_effects import (
     _is_settled_by,
     _likely,
@@ -38,30 +39,54 @@ def test_variants_of_one_effect_take_no_place_of_another():
     assert sorted(found) == sorted(LIKELY)
 
 
-def test_a_delay_that_did_not_settle_is_tried_beside_a_lag_that_leaves_nothing(
-    monkeypatch,
+@pytest.mark.parametrize(
+    ("of_lag", "whiteness", "settled"),
+    [
+        # Runs through the port leave nothing but noise: no turn of the stand-in follows ...
+        (100.0, 0.5, []),
+        # ... unless something remains.
+        (250.0, 3.0, ["actuator_lag"]),
+    ],
+)
+def test_an_effect_at_a_port_is_fitted_through_runs_first(
+    monkeypatch, of_lag, whiteness, settled
 ):
-    # Turns of the stand-in ran away from the delay; the lag imitates it with two parameters.
-    tried = []
-    monkeypatch.setattr(
-        single_effects,
-        "with_input_effect",
-        lambda findings, one, runs, values: tried.append(one.effects),
-    )
+    lag = made_up(("actuator_lag",), 150.0)
+    run = made_up(("actuator_lag",), of_lag, whiteness=whiteness)
+    turns = []
+
+    def by_turns(findings, one, runs, values, rival):
+        turns.append(one.effects[0])
+
+    monkeypatch.setattr(single_effects, "with_port_effect", lambda *_: run)
+    monkeypatch.setattr(single_effects, "fit_of_run", lambda findings, turn: turn)
+    monkeypatch.setattr(single_effects, "settled", by_turns)
+    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0))
     runs = SimpleNamespace(
         simulator=SimpleNamespace(free={"gain": None}),
         run_tasks=SimpleNamespace(are_spent=False),
     )
-    findings = SimpleNamespace(criteria=CRITERIA, base=base())
-    delay = made_up(("input_delay",), 100.0, whiteness=0.5)
-    lag = made_up(("actuator_lag:second_order",), 100.0, whiteness=0.5)
-    friction = made_up(("coulomb_friction",), 100.0, whiteness=0.5)
-    behind = made_up(("rate_limit",), 350.0)
-    likely = [lag, delay, friction, behind]
-    single_effects._on_input_through_runs(
-        findings, runs, {}, likely, {lag.effects: lag}
-    )
-    assert tried == [delay.effects]
+    tried = single_effects._Tried(findings)
+    tried.keep(single_effects._in_simulation(tried, lag, runs, {}))
+    assert turns == settled
+    assert tried.fits[("actuator_lag",)] is run
+    # Not twice.
+    single_effects._in_simulation(tried, lag, runs, {})
+    assert turns == [*settled, "actuator_lag"]
+
+
+def test_an_effect_that_leaves_far_more_than_another_at_a_port_is_not_tried_beside_it():
+    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0))
+    tried = single_effects._Tried(findings)
+    tried.at_ports = AtPorts({"output_backlash": 0.15, "input_delay": 0.9})
+    delay = made_up(("input_delay",), 100.0)
+    assert not tried.is_told_by_ports(delay)
+    play = made_up(("output_backlash",), 100.0, whiteness=0.5)
+    tried.fits = {play.effects: play}
+    assert tried.is_told_by_ports(delay)
+    assert not tried.is_told_by_ports(made_up(("gravity",), 100.0))
+    tried.at_ports = AtPorts({"output_backlash": 0.3, "input_delay": 0.9})
+    assert not tried.is_told_by_ports(delay)
 
 
 def test_kinds_of_friction_do_not_keep_a_dead_zone_from_the_simulation():

@@ -1,4 +1,4 @@
-"""Effects on the input of simulations that no linear drive stands for."""
+"""Effects at the ports of simulations that no linear drive stands for."""
 
 from itertools import pairwise
 
@@ -108,3 +108,71 @@ def test_a_dead_zone_is_told_by_runs_where_no_drive_can_stand_for_the_simulation
 def test_nothing_is_named_where_parameters_are_all_that_is_off():
     found, _ = diagnosed(threshold=0.0)
     assert found.verdict == "parameters"
+
+
+# That play before a sensor looks like to a drive, and play.
+LIKE_PLAY = ("actuator_lag", "clock_skew", "input_delay", "output_backlash")
+TICK, INERTIA, PRELOAD = 4e-3, 4e-4, 0.12
+FLAP = {"spring": 0.45, "damping": 0.02, "friction": 0.028}
+FLAP_GIVEN = {"spring": 0.42, "damping": 0.023, "friction": 0.031}
+FLAP_FREE = {
+    name: FreeParameter(one, (one / 5, 5 * one)) for name, one in FLAP_GIVEN.items()
+}
+
+
+def turned(values, torque):
+    """Angle of a flap with a preloaded spring and dry friction, [rad]."""
+    angle, speed, found = 0.0, 0.0, [0.0]
+    for left, right in pairwise(torque.tolist()):
+        for share in np.arange(0.05, 1.0, 0.1):
+            pull = left + share * (right - left) - values["damping"] * speed
+            pull -= values["friction"] * np.tanh(speed / 0.05)
+            pull -= values["spring"] * angle + PRELOAD * np.tanh(angle / 0.01)
+            speed += 0.1 * TICK * pull / INERTIA
+            angle += 0.1 * TICK * speed
+        found.append(angle)
+    return np.array(found)
+
+
+def with_play(angle, half_gap):
+    seen = [angle[0]]
+    for one in angle[1:].tolist():
+        seen.append(min(max(seen[-1], one - half_gap), one + half_gap))
+    return np.array(seen)
+
+
+@pytest.mark.thorough
+def test_play_before_the_sensor_is_told_by_runs_of_a_flap_with_a_preloaded_spring():
+    rng = np.random.default_rng(11)
+    time = TICK * np.arange(900)
+    inputs = (
+        0.32 * np.sin(2 * np.pi * (0.2 + 0.3 * time) * time),
+        np.repeat(rng.uniform(-0.4, 0.4, 9), 100) * (time > 0.2),
+        np.interp(time, [0.0, 1.0, 2.5, 3.6], [0.0, 0.35, -0.35, 0.2]),
+        0.3 * np.sin(6.0 * time) + 0.25 * np.sin(10.7 * time + 0.4),
+    )
+    given = [
+        Recording(
+            f"move_{row}", one,
+            with_play(turned(FLAP, one), 0.03) + 3e-3 * rng.standard_normal(one.size),
+            TICK, kind="other", input_unit="N m", output_unit="rad",
+        )
+        for row, one in enumerate(inputs)
+    ]  # fmt: skip
+
+    def simulated(request):
+        return SimulatorRun(turned(request.parameters, request.input), np.zeros(0))
+
+    able = Capabilities(run=True, parameters=True)
+    found = diagnose_foreign(
+        given, Simulator(able, simulated, {}, FLAP_FREE, FLAP_GIVEN),
+        DiagnoseOptions(hold_out=("move_1",), laws="never"), Count(),
+        lambda what, n: None,
+    )  # fmt: skip
+    assert (found.verdict, found.complete) == ("named", True)
+    (effect,) = found.effects
+    assert effect.id == "output_backlash"
+    assert effect.parameters[0].value == pytest.approx(0.03, rel=0.04)
+    assert [one.after for one in found.base] == pytest.approx(
+        list(FLAP.values()), rel=0.05
+    )

@@ -1,8 +1,9 @@
-"""Effects on the input alone, fitted through the simulation's own runs.
+"""Effects at the ports of a simulation, on its input or its output, fitted through its runs.
 
-They need no loop: a run with the changed input is exact. Parameters of the simulation that
-have imitated a delay leave a second minimum, which no turn leaves; so effect and parameters
-are fitted together, from the parameters as stated too. docs/method_diagnosis.md, eq. (D32c).
+They need no loop: a run with the changed input is exact, and so is a reading of a run.
+Parameters of the simulation that have imitated a delay leave a second minimum, which no turn
+leaves; so effect and parameters are fitted together, from the parameters as stated too.
+docs/method_diagnosis.md, eq. (D32c).
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,21 +18,24 @@ from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.settling import begun_with
 from hwid_cli.diagnosis.simulator import Runs
+from hwid_cli.diagnosis.stand_in import changes_input, moved_as
 from hwid_cli.diagnosis.turns import Turn, best_turn, forces_along, held, pushed
 from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.output import read
+from hwid_cli.drive.simulation import parameter_vector
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.programs import FreeParameter, SimulatorRun
 
 
-def with_input_effect(
+def with_port_effect(
     findings: Findings, fit: CandidateFit, runs: Runs, values: dict[str, float]
 ) -> Turn | None:
-    """Best run with an effect on the input, fitted together with the parameters.
+    """Best run with an effect at a port, fitted together with the parameters.
 
     Parameters
     ----------
     fit : CandidateFit
-        Of one effect on the input to the stand-in.
+        Of one effect at a port to the stand-in.
     values : dict of str to float
         Parameters of the simulation as they were fitted without it.
 
@@ -53,26 +57,32 @@ def with_input_effect(
     return None if turn.sse.sum() >= findings.base.sse.sum() else turn
 
 
-def run_with_input(
+def run_with_port_effect(
     findings: Findings,
     fit: CandidateFit,
     runs: Runs,
-    signals: Sequence[Signals],
+    plain: tuple[Sequence[Signals], Sequence[SimulatorRun]],
     values: dict[str, float],
 ) -> list[SimulatorRun] | None:
-    """Run the simulation on some recordings with its input as an effect changes it.
+    """Run the simulation on some recordings with an effect on its input or its output.
 
     Parameters
     ----------
+    plain : tuple of sequences of Signals and SimulatorRun
+        The recordings, and runs without the effect, which another reading is made of.
     values : dict of str to float
         Parameters of the simulation.
     """
     search = _Search(findings, without_base(fit), runs)
-    return search.ask(signals, {**values, **search.of_effect})
+    signals, found = plain
+    both = {**values, **search.of_effect}
+    if changes_input(fit.effects):
+        return search.ask(signals, both)
+    return search.read(signals, found, both)
 
 
 class _Search:
-    """An effect on the input and the simulation's parameters as one set of values.
+    """An effect at a port and the simulation's parameters as one set of values.
 
     Parameters
     ----------
@@ -124,7 +134,10 @@ class _Search:
     def ask(
         self, signals: Sequence[Signals], values: Mapping[str, float]
     ) -> list[SimulatorRun] | None:
-        """Run the simulation with its input as the effect changes it."""
+        """Run the simulation with its input, or its output, as the effect changes it."""
+        if not changes_input((self._effect,)):
+            found = self._runs.tried(signals, self._of_simulation(values))
+            return None if found is None else self.read(signals, found, values)
         forces = self._forces(values)
         if forces is None:
             return None
@@ -132,6 +145,22 @@ class _Search:
         chosen = [forces[rows[one.name]] for one in signals]
         some = replace(self._problem, signals=tuple(signals))
         return pushed(self._runs, some, chosen, False, self._of_simulation(values))
+
+    def read(
+        self,
+        signals: Sequence[Signals],
+        found: Sequence[SimulatorRun],
+        values: Mapping[str, float],
+    ) -> list[SimulatorRun]:
+        """What a sensor with the effect shows of runs."""
+        of_effect = {_name(key): values[key] for key in self.of_effect}
+        vector = parameter_vector(self._problem.drive, {self._effect: of_effect})
+        read_runs = []
+        for one, run in zip(signals, found, strict=True):
+            moved, step = moved_as(one, run), one.sample_time_s
+            output = read(moved.position, moved.velocity, one.driven_by, step, vector)
+            read_runs.append(replace(run, output=output))
+        return read_runs
 
     def begun(self, values: Mapping[str, float]) -> Turn | None:
         """A first turn from these values."""
@@ -145,6 +174,8 @@ class _Search:
         return begun_with(turn, self._runs, own, forces)
 
     def _forces(self, values: Mapping[str, float]) -> list[np.ndarray] | None:
+        if not changes_input((self._effect,)):
+            return [np.zeros(one.driven_by.size) for one in self._problem.signals]
         fit = with_values(self._fit, _by_ref(values, self.of_effect))
         point = rebuilt(self._problem, fit, self._findings.scales)
         forces = forces_along(self._problem, simulate_at(self._problem, *point))
