@@ -149,7 +149,12 @@ def _units(experiment: Experiment) -> Iterator[Fault]:
         if unit is None or is_unitless(unit):
             continue
         if not quantity_of(unit) or (role == "time") != (quantity_of(unit) == "time"):
-            yield wrong(place, unit, f"a unit such as {_EXAMPLES[role]}")
+            expected = f"a unit such as {_EXAMPLES[role]}"
+            if role == "time":
+                yield wrong(place, unit, expected)
+            else:
+                step = f"correct it; what needs no conversion is recordings.{role}_unit"
+                yield wrong(place, unit, expected, step)
         elif role == "time" and options.columns.time is None:
             yield wrong(
                 place,

@@ -13,6 +13,8 @@ from hwid_cli.records.programs import FreeParameter, SimulatorRun
 # Evaluations of a search; it goes on, so many times at most, where the last few of them
 # have still brought it below this share. Near a resonance it is far from its end.
 _MOST_EVALUATIONS, _MOST_SEARCHES = 8, 4
+# Beside a rival the first one has so many.
+_FIRST_EVALUATIONS = 4
 _LAST_FEW, _STILL_FALLS = 3, 0.8
 # Recordings that they are fitted to.
 _MOST_FITTED = 6
@@ -36,24 +38,63 @@ def fit_parameters(
     values : dict of str to float
         All of them, to begin with; they stay where no run is possible with them.
     """
+    return _fitted(ask, signals, free, values, np.inf) or values
+
+
+def fit_beside(
+    ask: Ask,
+    signals: Sequence[Signals],
+    free: Mapping[str, FreeParameter],
+    values: dict[str, float],
+    rival: Mapping[str, float],
+) -> dict[str, float] | None:
+    """The same, given up where a few evaluations leave more than something else does.
+
+    Parameters
+    ----------
+    rival : mapping of str to float, [output unit squared]
+        What that leaves of each recording, by its name.
+    """
+    most = sum(rival[one.name] for one in _chosen(signals))
+    return _fitted(ask, signals, free, values, most)
+
+
+def _chosen(signals: Sequence[Signals]) -> list[Signals]:
+    """Training recordings that parameters are fitted to: large and small ones."""
     train = [one for one in signals if not one.is_held_out]
     train = sorted(train, key=lambda one: -float(np.ptp(one.compared)))
-    # Large and small ones.
-    chosen = train[:: max(1, len(train) // _MOST_FITTED)][:_MOST_FITTED]
+    return train[:: max(1, len(train) // _MOST_FITTED)][:_MOST_FITTED]
+
+
+def _fitted(
+    ask: Ask,
+    signals: Sequence[Signals],
+    free: Mapping[str, FreeParameter],
+    values: dict[str, float],
+    most: float,
+) -> dict[str, float] | None:
+    """Fitted parameters; None where runs fail or leave more than so much, [output unit^2]."""
     sizes = np.array([abs(one.value) or 1.0 for one in free.values()])
     limits = [one.limits for one in free.values()]
     low, high = (np.array(ends) / sizes for ends in zip(*limits, strict=True))
-    gap = _Gap(ask, chosen, values, dict(zip(free, sizes.tolist(), strict=True)), high)
+    of_size = dict(zip(free, sizes.tolist(), strict=True))
+    gap = _Gap(ask, _chosen(signals), values, of_size, high)
     start = np.clip(np.array([values[name] for name in free]) / sizes, low, high)
     if not np.isfinite(gap.errors(start)).all():
-        return values
-    for _ in range(_MOST_SEARCHES):
+        return None
+    searches = [_MOST_EVALUATIONS] * _MOST_SEARCHES
+    if np.isfinite(most):
+        searches.insert(0, _FIRST_EVALUATIONS)
+    for evaluations in searches:
         found = scipy.optimize.least_squares(
             gap.errors, start, gap.slopes, (low, high), x_scale=1.0,
-            max_nfev=_MOST_EVALUATIONS, ftol=1e-6, xtol=1e-5,
+            max_nfev=evaluations, ftol=1e-6, xtol=1e-5,
         )  # fmt: skip
         start = found.x
-        if found.status > 0 or not gap.falls:
+        if 2.0 * found.cost > most:
+            return None
+        is_first = evaluations == _FIRST_EVALUATIONS
+        if found.status > 0 or not (is_first or gap.falls):
             break
     return gap.at(start)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate import rebuilt, with_values, without_base
 from hwid_cli.diagnosis.findings import Findings
-from hwid_cli.diagnosis.own_parameters import cost_of, fit_parameters
+from hwid_cli.diagnosis.own_parameters import cost_of, fit_beside
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.settling import begun_with
@@ -49,8 +49,10 @@ def with_port_effect(
     best = search.best_of(search.starts(values))
     if best is None:
         return None
-    found = fit_parameters(search.ask, findings.problem.signals, search.free, best)
-    begun = search.begun(found)
+    signals, base = findings.problem.signals, findings.base.sse.tolist()
+    without = dict(zip((one.name for one in signals), base, strict=True))
+    found = fit_beside(search.ask, signals, search.free, best, without)
+    begun = None if found is None else search.begun(found)
     turn = None if begun is None else best_turn(findings, begun, runs)
     if turn is None or turn.tried is None:
         return None

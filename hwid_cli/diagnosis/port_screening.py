@@ -25,7 +25,7 @@ from hwid_cli.records.programs import SimulatorRun
 # Training recordings that they are tried on: those that move most.
 _MOST_RECORDINGS = 2
 # Of what the simulation leaves of these, a likely effect leaves at most this share, [-].
-_CLEARLY_LESS = 0.5
+_CLEARLY_LESS = 0.35
 # Of so many that leave less than this share, sizes between the start values are tried, which
 # are about a factor of three apart.
 _MOST_REFINED, _LESS, _BETWEEN = 3, 0.95, (1.73, 1.32)

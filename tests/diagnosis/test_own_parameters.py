@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.own_parameters import fit_parameters
+from hwid_cli.diagnosis.own_parameters import fit_beside, fit_parameters
 from hwid_cli.diagnosis.simulator import DIFFERENCE, difference_for
 from hwid_cli.records.programs import FreeParameter, SimulatorRun
 
@@ -31,7 +31,7 @@ class Valley:
 def signals():
     return [
         SimpleNamespace(
-            compared=np.zeros(3), evaluated=slice(None), n_evaluated=3,
+            name="one", compared=np.zeros(3), evaluated=slice(None), n_evaluated=3,
             is_held_out=False,
         )
     ]  # fmt: skip
@@ -55,6 +55,18 @@ def test_a_search_that_hardly_leaves_less_ends():
     found = fitted(valley)
     assert found["a"] < 0.9
     assert len(valley.asked) <= 8 * 3 + 1
+
+
+@pytest.mark.parametrize("floor", [0.0, 100.0])
+def test_a_search_beside_a_rival_is_given_up_early_or_goes_to_its_end(floor):
+    valley = Valley(floor)
+    values = {name: one.value for name, one in FREE.items()}
+    found = fit_beside(valley, signals(), FREE, values, {"one": 100.0})
+    if floor:
+        assert found is None
+        assert len(valley.asked) <= 4 * 3 + 1
+    else:
+        assert found == pytest.approx({"a": 1.0, "b": 1.0}, abs=1e-3)
 
 
 def test_no_run_is_asked_for_twice_in_a_search():
