@@ -386,6 +386,17 @@ def rebuilt(
     return fit_layout, ParameterPoint(np.array(shared), own)
 
 
+def belongs_to(problem: DiagnosisProblem, found: CandidateFit, scales: Scales) -> bool:
+    """Whether a fit has the values that the recordings of a problem have for themselves.
+
+    How these start may be known in one problem and found in another.
+    """
+    ids = (*drive_effects(problem.drive), *found.effects)
+    start: dict[str, dict[str, float]] = {one: {} for one in ids}
+    fit_layout = parameter_layout(problem, ids, start, scales)
+    return tuple(one.ref for one in fit_layout.own) == tuple(found.own_names)
+
+
 def compared_with_fit(
     problem: DiagnosisProblem, found: CandidateFit, scales: Scales
 ) -> list[Compared]:

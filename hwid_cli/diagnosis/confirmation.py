@@ -8,12 +8,13 @@ from dataclasses import replace
 from hwid_cli.diagnosis.candidate import rebuilt, without_owner
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.parameters import residuals_at, sum_of_squares
-from hwid_cli.diagnosis.selection import LEAST_LAST_CONTRIBUTION
+from hwid_cli.diagnosis.selection import LEAST_EXPLAINED, LEAST_LAST_CONTRIBUTION
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.turns import Turn, fit_of_run, is_as_good
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.records.candidates import CandidateFit
 
 
 def confirm(
@@ -49,9 +50,21 @@ def confirm(
     run = found.verdict.chosen
     is_enough = is_as_good(best) or criteria.is_nearly_all(run, findings.base)
     may_be_named = not (criteria.replaces(run) or criteria.imitates_one_law(run))
+    may_be_named = may_be_named and _explains(findings, run)
     if is_enough and may_be_named:
         return found, best.values_of_run, True
     return unconfirmed(findings), best.values_of_run, False
+
+
+def _explains(findings: Findings, run: CandidateFit) -> bool:
+    """Whether a run with effects leaves clearly less of the recordings held out.
+
+    The stand-in's own fit has; a run may leave as much of all recordings, and more there.
+    """
+    criteria = findings.criteria
+    if not run.effects or criteria.is_complete(run):
+        return True
+    return criteria.evidence(run, findings.base).explained >= LEAST_EXPLAINED
 
 
 def _without_idle(findings: Findings, best: Turn, runs: Runs) -> Turn:

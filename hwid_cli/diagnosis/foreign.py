@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import fitted_drive
+from hwid_cli.diagnosis.candidate import belongs_to, fitted_drive
 from hwid_cli.diagnosis.causes import without_repeats
 from hwid_cli.diagnosis.confirmation import confirm, unconfirmed
 from hwid_cli.diagnosis.diagnose import find, held_out_of
@@ -27,7 +27,7 @@ from hwid_cli.diagnosis.single_effects import ToldByRuns, single_in_simulation
 from hwid_cli.diagnosis.stand_in import change_between
 from hwid_cli.diagnosis.standing import its_own, standing_beside
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
-from hwid_cli.diagnosis.turns import have_moved
+from hwid_cli.diagnosis.turns import have_moved, where_it_starts
 from hwid_cli.diagnosis.untold import (
     law_without_forces_told,
     untold_parameters,
@@ -160,7 +160,7 @@ def _searched(
         is_all = found.criteria.is_nearly_all(found.verdict.chosen, found.base)
         if is_confirmed and (is_all or _is_all_but_nothing(found)):
             break
-        if runs.run_tasks.are_spent:
+        if runs.run_tasks.are_spent or (count and _has_few_runs(runs)):
             break
         # Parameters that imitated what is missing have led elsewhere; or to where nothing
         # holds in the simulation: the given ones have imitated nothing yet.
@@ -173,6 +173,11 @@ def _searched(
     if kept is None:
         raise ValueError("no search was made")
     return kept
+
+
+def _has_few_runs(runs: Runs) -> bool:
+    """Whether no further single effect would be tried."""
+    return runs.up_to(_FOR_SINGLES).run_tasks.are_spent
 
 
 def _found(
@@ -274,7 +279,14 @@ def _with_runs(found: Findings, alone: ToldByRuns) -> Findings:
     """
     if found.verdict.word != "unknown":
         return found
-    fits = {**found.found.fits, **alone.fits}
+    problem = found.problem
+    of_runs = {ids: where_it_starts(problem, one) for ids, one in alone.fits.items()}
+    leads = {
+        ids: one
+        for ids, one in of_runs.items()
+        if belongs_to(problem, one, found.scales)
+    }
+    fits = {**found.found.fits, **leads}
     return replace(found, found=replace(found.found, fits=fits))
 
 

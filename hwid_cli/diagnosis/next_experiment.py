@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import rebuilt
+from hwid_cli.diagnosis.candidate import belongs_to, rebuilt
 from hwid_cli.diagnosis.parameters import (
     ParameterLayout,
     ParameterPoint,
@@ -63,7 +63,12 @@ def propose(
     """
     if verdict.word not in UNDECIDED:
         return NextExperiment("", "the recordings decide; no further one is needed")
-    pair = undecided_candidates(criteria, verdict, fits)[:2]
+    # A run of the simulation may have known how recordings start where a fit had found it.
+    pair = [
+        one
+        for one in undecided_candidates(criteria, verdict, fits)
+        if belongs_to(problem, one, scales)
+    ][:2]
     if len(pair) < 2:
         return NextExperiment("", "no candidate could be simulated")
     if problem.compares_command:

@@ -204,8 +204,12 @@ def _at_ports_by_runs_alone(
 ) -> list[Turn]:
     """Effects at the ports that the simulation calls likely, whatever its stand-in says."""
     findings, found = tried.findings, []
+    if runs.run_tasks.are_spent:
+        return []
     tried.at_ports = screened_at_ports(findings, runs, values)
     for one in tried.at_ports.likely[:_MOST_BY_RUNS]:
+        if runs.run_tasks.are_spent:
+            break
         tried.through_runs.add(one.effects)
         turn = with_port_effect(findings, one, runs, values)
         if turn is not None:

@@ -9,6 +9,7 @@ from hwid_cli.diagnosis.candidate import (
     MOST_ITERATIONS,
     SCREENING_SAMPLES,
     base_start,
+    belongs_to,
     bends_effects,
     fitted_drive,
     fitted_effects,
@@ -425,3 +426,11 @@ def test_an_effect_of_the_simulation_is_bent_beyond_a_factor_of_two(times, is_be
     values[column] = times * 0.8
 
     assert bends_effects(of.drive, replace(found, values=values)) == is_bent
+
+
+def test_a_fit_belongs_to_recordings_that_start_as_its_own_did():
+    rest = problem(recordings(COULOMB))
+    found = fit(rest, START, scales=sizes(rest))
+    assert belongs_to(rest, found, sizes(rest))
+    anywhere = replace(rest, start="estimated")
+    assert not belongs_to(anywhere, found, sizes(rest))

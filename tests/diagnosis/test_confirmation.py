@@ -12,14 +12,24 @@ from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.records.drive import StandIn
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 
+PAIR = ("cubic_stiffness", "one_sided_stop:contact")
+FRICTION = ("coulomb_friction",)
+
 
 @pytest.mark.parametrize(
-    ("left", "whiteness", "is_named"), [(100.0, 0.9, True), (124.0, 30.0, False)]
+    ("pair", "left", "whiteness", "is_named"),
+    [
+        (PAIR, 100.0, 0.9, True),
+        # Two that look alike are no fact where the run leaves something.
+        (PAIR, 124.0, 30.0, False),
+        (FRICTION, [*[9e4] * 3, *[2e5] * 3], 30.0, True),
+        # Nor is what leaves more of the recordings held out than the base does.
+        (FRICTION, [*[9e4] * 3, *[9e5] * 3], 30.0, False),
+    ],
 )
-def test_two_that_look_alike_are_no_fact_where_its_run_leaves_something(
-    monkeypatch, left, whiteness, is_named
+def test_what_was_found_is_a_fact_where_its_own_run_bears_it_out(
+    monkeypatch, pair, left, whiteness, is_named
 ):
-    pair = ("cubic_stiffness", "one_sided_stop:contact")
     run = made_up(pair, left, whiteness=whiteness)
     whole = base(600_000.0)
     findings = Findings(

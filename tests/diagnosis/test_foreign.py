@@ -614,6 +614,7 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
     asked.clear()
     alone = ToldByRuns(one, {"c": 1.0}, is_all=False)
     monkeypatch.setattr(foreign, "find", find)
+    monkeypatch.setattr(foreign, "belongs_to", lambda *_: True)
     monkeypatch.setattr(foreign, "with_further_effect", lambda first, *_: first)
     monkeypatch.setattr(foreign, "single_in_simulation", lambda *_: alone)
     monkeypatch.setattr(
@@ -785,8 +786,20 @@ def test_after_the_runs_that_are_allowed_the_answer_is_the_best_until_then():
     assert len(named[0]) < len(named[1]) == 2
 
 
-@pytest.mark.parametrize(("word", "is_of_runs"), [("unknown", True), ("named", False)])
-def test_leads_are_those_of_the_simulations_own_runs(word, is_of_runs):
+@pytest.mark.parametrize(
+    ("word", "starts_alike", "is_of_runs"),
+    [
+        ("unknown", True, True),
+        ("named", True, False),
+        # A run whose starts were found where others are known cannot be played again.
+        ("unknown", False, False),
+    ],
+)
+def test_leads_are_those_of_the_simulations_own_runs(
+    monkeypatch, word, starts_alike, is_of_runs
+):
+    monkeypatch.setattr(foreign, "where_it_starts", lambda problem, fit: fit)
+    monkeypatch.setattr(foreign, "belongs_to", lambda *_: starts_alike)
     said = made_up(("cogging",), 10.0)
     other = made_up(("coulomb_friction",), 50.0)
     run = replace(said, sse=90.0 * said.sse)
@@ -806,6 +819,8 @@ class Some:
     found: object = None
     fits: object = None
     base: object = None
+    problem: object = None
+    scales: object = None
     criteria: object = field(
         default_factory=lambda: SimpleNamespace(leaves_next_to_nothing=lambda *_: False)
     )
