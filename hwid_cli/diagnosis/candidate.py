@@ -62,6 +62,8 @@ WITHIN_BEST = 1.1
 
 # A base parameter that the re-fit changes by this factor or more is bent.
 BENT = 2.0
+# From so many times the samples of a screening on, some of them are asked first.
+_MANY_TIMES = 4
 # What is left of an effect of the simulation in a start, at least, of what it states.
 _LEAST_LEFT = 0.1
 
@@ -483,9 +485,33 @@ def with_input_noise(
     fit_layout, point = rebuilt(problem, fit, scales)
     if not may_be_input_noise(problem, fit_layout, point, noise):
         return fit
+    if not _is_noise_of_few(problem, fit_layout, point, noise):
+        return fit
     point = fit_with_input_noise(problem, fit_layout, point, noise)
     found = at_point(problem, fit, fit_layout, point, noise)
     return found if found.cause == "input_noise" else fit
+
+
+def _is_noise_of_few(
+    problem: DiagnosisProblem,
+    fit_layout: ParameterLayout,
+    point: ParameterPoint,
+    noise: NoiseFloor,
+) -> bool:
+    """Whether noise of the input may be all, by a fit to some of many samples.
+
+    What is more than noise there is so in all of them.
+    """
+    if problem.n_evaluated <= _MANY_TIMES * SCREENING_SAMPLES:
+        return True
+    few = fewer_recordings(problem.part(held_out=False), SCREENING_SAMPLES)
+    names = {one.name for one in few.signals}
+    rows = [row for row, one in enumerate(problem.signals) if one.name in names]
+    own = ParameterPoint(point.shared, point.own[rows])
+    found = fit_with_input_noise(few, fit_layout, own, noise)
+    drives = drives_at(few, fit_layout, found)
+    _, cause = left_over(residuals_at(few, fit_layout, found), few, drives, noise)
+    return cause == "input_noise"
 
 
 def present_start(

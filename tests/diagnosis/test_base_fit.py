@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis import base_fit
+from hwid_cli.diagnosis import base_fit, candidate
 from hwid_cli.diagnosis.candidate import with_input_noise
 from hwid_cli.diagnosis.diagnose import find
 from hwid_cli.drive.simulation import simulate_drive
@@ -48,8 +48,7 @@ def loaded(number, drive):
     return replace(drive, mass_kg=(1.25 if number % 2 else 1.0) * drive.mass_kg)
 
 
-@pytest.mark.thorough
-def test_loads_of_a_free_axis_are_told_behind_noise_of_the_input():
+def loaded_and_noisy():
     free = replace(DRIVE, stiffness_N_per_m=0.0)
     rng = np.random.default_rng(3)
     noisy = [
@@ -58,7 +57,16 @@ def test_loads_of_a_free_axis_are_told_behind_noise_of_the_input():
     ]
     of = problem(noisy, stiffness_N_per_m=0.0)
     plain = fit(of, {"parameter_change:mass": {"log_mass": 0.0}})
-    noise = replace(white(), input_rms=0.1)
+    return of, plain, replace(white(), input_rms=0.1)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("are_many", [False, True])
+def test_loads_of_a_free_axis_are_told_behind_noise_of_the_input(monkeypatch, are_many):
+    of, plain, noise = loaded_and_noisy()
+    if are_many:
+        # Some of the recordings are asked before all of them.
+        monkeypatch.setattr(candidate, "SCREENING_SAMPLES", of.n_evaluated // 5)
     found = with_input_noise(of, plain, sizes(of), noise)
 
     def off(one):
@@ -73,6 +81,24 @@ def test_loads_of_a_free_axis_are_told_behind_noise_of_the_input():
     base = drive_of(found)["force_constant_N_per_A"] / np.exp(found.own[:, 0])
     true = np.where(np.arange(9) % 2, 5.0 / 1.25, 5.0)
     assert np.median(base / true) == pytest.approx(1.0, abs=0.01)
+
+
+def test_noise_of_the_input_is_not_fitted_to_many_samples_where_some_hold_more(
+    monkeypatch,
+):
+    of, plain, noise = loaded_and_noisy()
+    asked = []
+
+    def fitted(some, _, point, __):
+        asked.append(some.n_evaluated)
+        return point
+
+    monkeypatch.setattr(candidate, "fit_with_input_noise", fitted)
+    monkeypatch.setattr(candidate, "left_over", lambda *_: (9.0, ""))
+    monkeypatch.setattr(candidate, "SCREENING_SAMPLES", of.n_evaluated // 5)
+    assert with_input_noise(of, plain, sizes(of), noise) is plain
+    (n,) = asked
+    assert n < 0.5 * of.n_evaluated
 
 
 def drive_of(found):
