@@ -75,7 +75,8 @@ def diagnose_foreign(
         Computes tasks, runs of the simulation among them, or takes their results from
         where it kept them.
     """
-    counted = CountedRuns(run_tasks, most_runs(options.max_runs, len(recordings)))
+    most = most_runs(options.max_runs, len(recordings), len(simulator.free))
+    counted = CountedRuns(run_tasks, most)
     on_round = counted.told(on_round)
     held_out = held_out_of(recordings, options)
     problem = prepare(recordings, its_own(simulator), options, held_out)

@@ -13,7 +13,9 @@ from hwid_cli.records.programs import FreeParameter, SimulatorRun
 # Evaluations of a search; it goes on, so many times at most, where the last few of them
 # have still brought it below this share. Near a resonance it is far from its end.
 _MOST_EVALUATIONS, _MOST_SEARCHES = 8, 4
-# Beside a rival the first one has so many.
+# Beside a rival, where the values found are the answer, it goes on while they leave less
+# than this share, [-]; the first one has so many evaluations.
+_HARDLY_FALLS = 0.999
 _FIRST_EVALUATIONS = 4
 _LAST_FEW, _STILL_FALLS = 3, 0.8
 # Recordings that they are fitted to.
@@ -38,7 +40,8 @@ def fit_parameters(
     values : dict of str to float
         All of them, to begin with; they stay where no run is possible with them.
     """
-    return _fitted(ask, signals, free, values, np.inf) or values
+    chosen = _chosen(signals)
+    return _fitted(ask, chosen, free, values, np.inf) or values
 
 
 def fit_beside(
@@ -55,8 +58,9 @@ def fit_beside(
     rival : mapping of str to float, [output unit squared]
         What that leaves of each recording, by its name.
     """
-    most = sum(rival[one.name] for one in _chosen(signals))
-    return _fitted(ask, signals, free, values, most)
+    chosen = _chosen(signals)
+    most = sum(rival[one.name] for one in chosen)
+    return _fitted(ask, chosen, free, values, most)
 
 
 def _chosen(signals: Sequence[Signals]) -> list[Signals]:
@@ -78,13 +82,14 @@ def _fitted(
     limits = [one.limits for one in free.values()]
     low, high = (np.array(ends) / sizes for ends in zip(*limits, strict=True))
     of_size = dict(zip(free, sizes.tolist(), strict=True))
-    gap = _Gap(ask, _chosen(signals), values, of_size, high)
+    gap = _Gap(ask, signals, values, of_size, high)
     start = np.clip(np.array([values[name] for name in free]) / sizes, low, high)
     if not np.isfinite(gap.errors(start)).all():
         return None
-    searches = [_MOST_EVALUATIONS] * _MOST_SEARCHES
+    searches, falls = [_MOST_EVALUATIONS] * _MOST_SEARCHES, _STILL_FALLS
     if np.isfinite(most):
         searches.insert(0, _FIRST_EVALUATIONS)
+        falls = _HARDLY_FALLS
     for evaluations in searches:
         found = scipy.optimize.least_squares(
             gap.errors, start, gap.slopes, (low, high), x_scale=1.0,
@@ -94,7 +99,7 @@ def _fitted(
         if 2.0 * found.cost > most:
             return None
         is_first = evaluations == _FIRST_EVALUATIONS
-        if found.status > 0 or not (is_first or gap.falls):
+        if found.status > 0 or not (is_first or gap.falls_by(falls)):
             break
     return gap.at(start)
 
@@ -169,10 +174,9 @@ class _Gap:
         self._slopes: dict[int, np.ndarray] = {}
         self._sloped: tuple[bytes, np.ndarray] | None = None
 
-    @property
-    def falls(self) -> bool:
-        """Whether the last few evaluations have left clearly less than those before."""
-        return min(self._costs) < _STILL_FALLS * min(self._costs[:-_LAST_FEW])
+    def falls_by(self, share: float) -> bool:
+        """Whether the last few evaluations have left less than a share of those before."""
+        return min(self._costs) < share * min(self._costs[:-_LAST_FEW])
 
     def at(self, coordinates: np.ndarray) -> dict[str, float]:
         """All parameters."""

@@ -18,7 +18,7 @@ from hwid_cli.diagnosis.port_effects import run_with_port_effect
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import acts_at_port
-from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.programs import SimulatorRun
 
@@ -134,7 +134,7 @@ def _starts(findings: Findings) -> list[CandidateFit]:
             valleys=np.zeros((0, 0)),
         )
         for effect in looked_for
-        if not CATALOGUE[effect].contains
+        if public_id(effect) == effect
         for start in CATALOGUE[effect].starts(findings.scales)
     ]
 

@@ -27,8 +27,9 @@ _LEAST_CHANGE = 0.1
 # A difference that should be wider by more than this is taken again.
 _CLEARLY_WIDER = 2.0
 
-# Of a diagnosis, at most, where nobody says how many: in all, or for each recording.
-_FEWEST_RUNS, _RUNS_OF_EACH = 800, 80
+# Of a diagnosis, at most, where nobody says how many: in all, or for each recording and
+# what is fitted to it.
+_FEWEST_RUNS, _RUNS_OF_EACH = 800, 40
 
 
 def difference_for(slope: np.ndarray, errors_rms: float) -> float:
@@ -113,17 +114,20 @@ class Simulator:
         return bool(self.effects) or not self.change.is_none
 
 
-def most_runs(given: int | None, n_recordings: int) -> int:
+def most_runs(given: int | None, n_recordings: int, n_free: int = 1) -> int:
     """Runs after which nothing is tried that may be left out.
 
     Parameters
     ----------
     given : int or None
-        By the configuration; None means 800, or 80 for each recording if that is more.
+        By the configuration; None means 800, or if that is more 40 for each recording and
+        each of the parameters and effects that are fitted to it.
+    n_free : int
+        Parameters of the simulation that are fitted again.
     """
     if given is not None:
         return given
-    return max(_FEWEST_RUNS, _RUNS_OF_EACH * n_recordings)
+    return max(_FEWEST_RUNS, _RUNS_OF_EACH * n_recordings * (1 + n_free))
 
 
 class CountedRuns:

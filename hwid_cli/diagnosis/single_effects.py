@@ -142,7 +142,7 @@ def _try_likely(
     findings = tried.findings
     for place, one in enumerate(likely, 1):
         fits = list(tried.fits.values())
-        if runs.run_tasks.are_spent and place > 1:
+        if runs.run_tasks.are_spent and (fits or place > 1):
             break
         if tried.is_told_by_ports(one) or _is_settled_by(findings, one, fits):
             continue

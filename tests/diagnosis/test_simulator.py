@@ -30,12 +30,13 @@ def test_what_begins_is_told_with_the_runs_until_then():
 
 
 @pytest.mark.parametrize(
-    ("given", "recordings", "most"), [(None, 4, 800), (None, 27, 2160), (50, 27, 50)]
+    ("given", "recordings", "free", "most"),
+    [(None, 4, 2, 800), (None, 6, 5, 1440), (None, 27, 1, 2160), (50, 27, 3, 50)],
 )
-def test_as_many_runs_as_there_are_recordings_unless_the_configuration_says(
-    given, recordings, most
+def test_as_many_runs_as_recordings_and_parameters_ask_for_unless_the_configuration_says(
+    given, recordings, free, most
 ):
-    assert most_runs(given, recordings) == most
+    assert most_runs(given, recordings, free) == most
 
 
 def test_some_runs_are_left_for_what_follows():
