@@ -78,12 +78,8 @@ def _fitted(
     most: float,
 ) -> dict[str, float] | None:
     """Fitted parameters; None where runs fail or leave more than so much, [output unit^2]."""
-    sizes = np.array([abs(one.value) or 1.0 for one in free.values()])
-    limits = [one.limits for one in free.values()]
-    low, high = (np.array(ends) / sizes for ends in zip(*limits, strict=True))
-    of_size = dict(zip(free, sizes.tolist(), strict=True))
-    gap = _Gap(ask, signals, values, of_size, high)
-    start = np.clip(np.array([values[name] for name in free]) / sizes, low, high)
+    gap = _Gap(ask, signals, free, values)
+    start = np.clip(gap.coordinates(values), gap.low, gap.high)
     if not np.isfinite(gap.errors(start)).all():
         return None
     searches, falls = [_MOST_EVALUATIONS] * _MOST_SEARCHES, _STILL_FALLS
@@ -92,7 +88,7 @@ def _fitted(
         falls = _HARDLY_FALLS
     for evaluations in searches:
         found = scipy.optimize.least_squares(
-            gap.errors, start, gap.slopes, (low, high), x_scale=1.0,
+            gap.errors, start, gap.slopes, (gap.low, gap.high), x_scale=1.0,
             max_nfev=evaluations, ftol=1e-6, xtol=1e-5,
         )  # fmt: skip
         start = found.x
@@ -119,14 +115,12 @@ def linearised(
     ndarray, shape (n_evaluated, n_free), [output unit]
         Their derivatives by each parameter over its size.
     """
-    sizes = {name: abs(one.value) or 1.0 for name, one in free.items()}
-    high = np.array([free[name].limits[1] / size for name, size in sizes.items()])
-    gap = _Gap(ask, signals, values, sizes, high)
-    here = np.array([values[name] / size for name, size in sizes.items()])
+    gap = _Gap(ask, signals, free, values)
+    here = gap.coordinates(values)
     errors = gap.errors(here)
     if not np.isfinite(errors).all():
         return None
-    return errors, gap.slopes(here) if sizes else np.zeros((errors.size, 0))
+    return errors, gap.slopes(here) if free else np.zeros((errors.size, 0))
 
 
 def cost_of(ask: Ask, signals: Sequence[Signals], values: Mapping[str, float]) -> float:
@@ -151,28 +145,33 @@ class _Gap:
 
     Parameters
     ----------
-    sizes : dict of str to float
-        Of the free parameters.
-    high : ndarray, shape (n_free,), [-]
-        Beyond which no difference may reach.
+    free : mapping of str to FreeParameter
+        What moves; no difference reaches beyond its bounds.
+    values : mapping of str to float
+        Of all parameters.
     """
 
     def __init__(
         self,
         ask: Ask,
         signals: Sequence[Signals],
+        free: Mapping[str, FreeParameter],
         values: Mapping[str, float],
-        sizes: dict[str, float],
-        high: np.ndarray,
     ) -> None:
-        self._ask, self._signals, self._high = ask, signals, high
-        self._values, self._sizes = values, sizes
+        self._ask, self._signals, self._values = ask, signals, values
+        self._sizes = {name: abs(one.value) or 1.0 for name, one in free.items()}
+        limits = np.array([one.limits for one in free.values()]).reshape(-1, 2)
+        self.low, self.high = limits.T / np.array(list(self._sizes.values()))
         self._size = sum(one.n_evaluated for one in signals)
         self._costs: list[float] = []
         # A search that goes on begins where its last part has been.
         self._asked: dict[bytes, np.ndarray] = {}
         self._slopes: dict[int, np.ndarray] = {}
         self._sloped: tuple[bytes, np.ndarray] | None = None
+
+    def coordinates(self, values: Mapping[str, float]) -> np.ndarray:
+        """Free parameters over their sizes, shape (n_free,), [-]."""
+        return np.array([values[name] / size for name, size in self._sizes.items()])
 
     def falls_by(self, share: float) -> bool:
         """Whether the last few evaluations have left less than a share of those before."""
@@ -224,7 +223,7 @@ class _Gap:
         self, coordinates: np.ndarray, here: np.ndarray, column: int, step: float
     ) -> np.ndarray:
         moved = coordinates.copy()
-        is_inside = moved[column] + step <= self._high[column]
+        is_inside = moved[column] + step <= self.high[column]
         moved[column] += step if is_inside else -step
         change = self._left(moved) - here
         return np.asarray(change / (step if is_inside else -step))

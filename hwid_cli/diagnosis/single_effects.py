@@ -122,6 +122,12 @@ class _Tried:
             for fit in self.fits.values()
         )
 
+    def are_nearly_all(self, turns: Sequence[Turn]) -> bool:
+        """Whether one of some runs leaves nothing that could be named."""
+        criteria, base = self.findings.criteria, self.findings.base
+        fits = [fit_of_run(self.findings, turn) for turn in turns]
+        return any(criteria.is_nearly_all(fit, base) for fit in fits)
+
     def keep(self, turns: Sequence[Turn]) -> None:
         """Keep runs that leave less than those before with the same effect."""
         for turn in turns:
@@ -157,17 +163,11 @@ def _in_simulation(
     tried: _Tried, one: CandidateFit, runs: Runs, values: dict[str, float]
 ) -> list[Turn]:
     """Best runs with an effect: one at a port through runs first, which are exact."""
-    findings, found = tried.findings, []
+    findings, found = tried.findings, list[Turn]()
     is_open = one.effects not in tried.through_runs
     if acts_at_port(one.effects) and runs.simulator.free and is_open:
-        tried.through_runs.add(one.effects)
-        turn = with_port_effect(findings, one, runs, values)
-        if turn is not None:
-            found.append(turn)
-            fit = fit_of_run(findings, turn)
-            if findings.criteria.is_nearly_all(fit, findings.base):
-                return found
-        if runs.run_tasks.are_spent:
+        found = _through_runs(tried, one, runs, values)
+        if tried.are_nearly_all(found) or runs.run_tasks.are_spent:
             return found
     rival = min((fit.sse.sum() for fit in tried.fits.values()), default=np.inf)
     turn = settled(findings, one, runs, values, float(rival))
@@ -203,21 +203,24 @@ def _at_ports_by_runs_alone(
     tried: _Tried, runs: Runs, values: dict[str, float]
 ) -> list[Turn]:
     """Effects at the ports that the simulation calls likely, whatever its stand-in says."""
-    findings, found = tried.findings, []
+    found: list[Turn] = []
     if runs.run_tasks.are_spent:
-        return []
-    tried.at_ports = screened_at_ports(findings, runs, values)
+        return found
+    tried.at_ports = screened_at_ports(tried.findings, runs, values)
     for one in tried.at_ports.likely[:_MOST_BY_RUNS]:
-        if runs.run_tasks.are_spent:
+        if tried.are_nearly_all(found) or runs.run_tasks.are_spent:
             break
-        tried.through_runs.add(one.effects)
-        turn = with_port_effect(findings, one, runs, values)
-        if turn is not None:
-            found.append(turn)
-            fit = fit_of_run(findings, turn)
-            if findings.criteria.is_nearly_all(fit, findings.base):
-                break
+        found += _through_runs(tried, one, runs, values)
     return found
+
+
+def _through_runs(
+    tried: _Tried, one: CandidateFit, runs: Runs, values: dict[str, float]
+) -> list[Turn]:
+    """Best run with an effect at a port, fitted through runs; none where it leaves more."""
+    tried.through_runs.add(one.effects)
+    turn = with_port_effect(tried.findings, one, runs, values)
+    return [] if turn is None else [turn]
 
 
 def _twins(findings: Findings, fit: CandidateFit) -> list[CandidateFit]:

@@ -395,7 +395,7 @@ def acts_at_port(effects: Sequence[str]) -> bool:
     return bool(entries) and all(
         one.enters in ("command", "output")
         and not any(each.is_own for each in one.parameters)
-        and one.id != "clock_skew"
+        and not one.is_of_clock
         for one in entries
     )
 

@@ -383,6 +383,8 @@ class Effect:
         Whether the drive may bounce off it: the error may then have further valleys.
     moves_at_rest : bool
         Whether the drive moves before its input does, so that recordings start in motion.
+    is_of_clock : bool
+        Whether it reads the motion at other times, which no reading of the samples gives.
     strength : str
         Name of the parameter without which the effect is not there: where it is zero,
         or for a limit beyond all that it limits. Empty means the first one.
@@ -421,6 +423,7 @@ class Effect:
     is_rugged: bool = False
     bounces: bool = False
     moves_at_rest: bool = False
+    is_of_clock: bool = False
     is_linear: bool = False
     strength: str = ""
     size: Callable[[Values, Scales], float] | None = None

@@ -110,8 +110,6 @@ def test_nothing_is_named_where_parameters_are_all_that_is_off():
     assert found.verdict == "parameters"
 
 
-# That play before a sensor looks like to a drive, and play.
-LIKE_PLAY = ("actuator_lag", "clock_skew", "input_delay", "output_backlash")
 TICK, INERTIA, PRELOAD = 4e-3, 4e-4, 0.12
 FLAP = {"spring": 0.45, "damping": 0.02, "friction": 0.028}
 FLAP_GIVEN = {"spring": 0.42, "damping": 0.023, "friction": 0.031}

@@ -225,6 +225,7 @@ CLOCK = Effect(
     confused_with={
         "input_delay": "events at the start and at the end of a long recording"
     },
+    is_of_clock=True,
 )
 
 # Share of a recording that a filter's time constant may be.
