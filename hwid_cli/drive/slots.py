@@ -142,5 +142,8 @@ that is switched off is 0, except where the comment says infinite.
     SENSOR_LAG_DAMPING_RATIO,
     IRON,  # how far iron is driven at the reference current
     IS_STRIBECK_EXPONENTIAL,  # 1 where the excess falls as exp(-|v| / vs)
+    STOP_DASHPOT,
+    SIDE_DASHPOT,
+    SECOND_DASHPOT,
     N_SLOTS,
-) = range(135)
+) = range(138)

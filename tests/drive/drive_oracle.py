@@ -293,8 +293,10 @@ class _Run:
         depth = max(into, 0.0)
         force = one.value(name, "stiffness_N_per_m")
         force *= depth ** one.value(name, "exponent", 1.0)
-        damping = one.value(name, "damping_s_per_m")
-        return force * max(1.0 + damping * speed, 0.0)
+        force *= max(1.0 + one.value(name, "damping_s_per_m") * speed, 0.0)
+        if into <= 0.0:
+            return force
+        return max(force + one.value(name, "damping_N_s_per_m") * speed, 0.0)
 
     def _spring(self, x, with_cogging=True, v=0.0):
         one = self.machine

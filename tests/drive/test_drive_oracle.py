@@ -114,6 +114,20 @@ def test_stiff_stops_beside_curved_forces_follow_the_oracle(stop, effects, expon
     assert difference({stop: place | bent, **effects}) < STIFF_M
 
 
+# A dashpot lets go where its contact would pull: a corner within a Runge-Kutta step. Each
+# with about twice what was measured.
+LETTING_GO_M = 6e-7
+
+
+@pytest.mark.parametrize("damping", [10.0, 300.0])
+@pytest.mark.parametrize("effects", [{}, CUBIC, COULOMB], ids=["", "cubic", "coulomb"])
+@pytest.mark.parametrize("stop", ["end_stop", "one_sided_stop"])
+def test_stops_with_a_dashpot_follow_the_oracle(stop, effects, damping):
+    place = {"position_m": 0.012, "stiffness_N_per_m": 2e4}
+    damped = {stop: place | {"damping_N_s_per_m": damping}, **effects}
+    assert difference(damped) < LETTING_GO_M
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("effects", TOGETHER_SLOW, ids="+".join)
 def test_effects_of_many_events_together_follow_the_oracle(effects):

@@ -301,6 +301,39 @@ def test_with_equal_shapes_the_way_back_is_straight():
     np.testing.assert_allclose(slopes, 1e3, rtol=2e-3)
 
 
+# Stops with a dashpot -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.1, 0.4, 0.9])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(
+    "stop", ["end_stop", "one_sided_stop", "one_sided_stop:second"]
+)
+def test_a_dashpot_throws_back_as_its_closed_form_says(stop, side, ratio):
+    mass, stiffness, speed = 0.02, 2000.0, 0.1
+    rate, root = np.sqrt(stiffness / mass), np.sqrt(1.0 - ratio**2)
+    place = {
+        "position_m": 1e-3 * (1.0 if stop == "end_stop" else side),
+        "stiffness_N_per_m": stiffness,
+        "damping_N_s_per_m": 2.0 * ratio * np.sqrt(stiffness * mass),
+    }
+    effects = {stop: place}
+    if stop == "one_sided_stop:second":
+        effects["one_sided_stop"] = place | {"position_m": 2e-3 * side}
+    # Long enough to leave again, too short for the stop on the other side.
+    motion = free_axis(effects, 36, start=(0.0, side * speed), inertia=mass)
+    # Spring and dashpot cancel there; beyond it they would pull.
+    angle = np.arctan2(2.0 * ratio * root, 2.0 * ratio**2 - 1.0)
+    kept = np.exp(-ratio * angle / root)
+    # The corner of the force lies within a Runge-Kutta step.
+    np.testing.assert_allclose(motion.velocity[-1], -side * kept * speed, rtol=5e-4)
+    deepest = np.arctan2(root, ratio) / (root * rate)
+    depth = speed / rate * np.exp(-ratio * rate * deepest)
+    fine = free_axis(effects, 3600, start=(0.0, side * speed), inertia=mass, step=1e-5)
+    reached = np.max(side * fine.position)
+    np.testing.assert_allclose(reached, 1e-3 + depth, atol=1e-5 * depth)
+
+
 # All of them --------------------------------------------------------------------------
 
 
@@ -323,6 +356,11 @@ def test_with_equal_shapes_the_way_back_is_straight():
             "end_stop:contact",
             {"position_m": 0.01, "stiffness_N_per_m": 1e4, "damping_s_per_m": 1e-13},
             {"end_stop": {"position_m": 0.01, "stiffness_N_per_m": 1e4}},
+        ),
+        (
+            "one_sided_stop:dashpot",
+            {"position_m": 0.01, "stiffness_N_per_m": 1e4, "damping_N_s_per_m": 1e-13},
+            {"one_sided_stop": {"position_m": 0.01, "stiffness_N_per_m": 1e4}},
         ),
         (
             "one_sided_stop:contact",
@@ -367,6 +405,8 @@ def test_friction_of_every_kind_takes_energy_and_comes_to_rest(effects):
         ("end_stop", {"position_m": 1}, "end_stop"),
         ("end_stop", {"position_m": 1, "exponent": 2}, "end_stop:contact"),
         ("one_sided_stop", {"damping_s_per_m": 1}, "one_sided_stop:contact"),
+        ("end_stop", {"damping_N_s_per_m": 1}, "end_stop:dashpot"),
+        ("one_sided_stop", {"damping_N_s_per_m": 1}, "one_sided_stop:dashpot"),
         ("one_sided_stop:second", {"position_m": 1}, "one_sided_stop:second"),
         ("one_sided_stop:second", {"exponent": 1}, "one_sided_stop:second_contact"),
         ("cogging:second", {"period_m": 1}, "cogging:second"),

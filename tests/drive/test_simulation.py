@@ -103,6 +103,11 @@ NEUTRAL = {
         "exponent": 1.5,
         "damping_s_per_m": 1.0,
     },
+    "one_sided_stop:dashpot": {
+        "position_m": 1.0,
+        "stiffness_N_per_m": 1e4,
+        "damping_N_s_per_m": 10.0,
+    },
     "hysteresis:bouc_wen": {"force_N": 0.0, "yield_m": 1e-3, "exponent": 2.0},
     "one_sided_stop:second": {"position_m": 1.0, "stiffness_N_per_m": 1e4},
     "cogging:second": {"amplitude_N": 0.0, "period_m": 5e-3},

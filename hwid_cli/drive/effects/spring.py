@@ -189,6 +189,38 @@ def _contact(stop: Effect, slots: str, sentence: str) -> Effect:
     )
 
 
+def _with_dashpot(stop: Effect, slots: str, sentence: str) -> Effect:
+    """The same stop with a dashpot beside its spring."""
+    return replace(
+        stop,
+        id=f"{stop.id}_dashpot" if stop.beside else f"{stop.id}:dashpot",
+        sentence=sentence,
+        equation="F = -(ks d + c d') at a depth d beyond the position, never pulling",
+        parameters=(
+            *stop.parameters,
+            Parameter(
+                "damping_N_s_per_m",
+                lambda scales: tuple(
+                    share * scales.force_N / scales.velocity_m_per_s
+                    for share in (0.3, 3.0)
+                ),
+                lambda scales: (
+                    1e-3 * scales.force_N / scales.velocity_m_per_s,
+                    1e3 * scales.force_N / scales.velocity_m_per_s,
+                ),
+                places=(f"{slots}_DASHPOT",),
+                default=0.0,
+                limits=(NOT_NEGATIVE,),
+            ),
+        ),
+        confused_with={
+            **stop.confused_with,
+            "cubic_stiffness": "hits at several speeds",
+        },
+        contains=(stop.id, *stop.contains),
+    )
+
+
 def _usual_force(values: Values, scales: Scales) -> float:
     """Of a contact at a usual depth, [N]."""
     depth = _USUAL_DEPTH * scales.displacement_m
@@ -219,6 +251,14 @@ END_STOP_CONTACT = _contact(
 ONE_SIDED_CONTACT = _contact(
     ONE_SIDED, "SIDE", "a stop on one side only, curved and damped as contacts are"
 )
+END_STOP_DASHPOT = _with_dashpot(
+    END_STOP,
+    "STOP",
+    "a stop at the same distance on both sides, with a dashpot beside its spring",
+)
+ONE_SIDED_DASHPOT = _with_dashpot(
+    ONE_SIDED, "SIDE", "a stop on one side only, with a dashpot beside its spring"
+)
 ONE_SIDED_SECOND = replace(
     ONE_SIDED,
     id="one_sided_stop:second",
@@ -236,6 +276,12 @@ ONE_SIDED_SECOND_CONTACT = _contact(
     ONE_SIDED_SECOND,
     "SECOND",
     "a second stop, at another place, curved and damped as contacts are",
+)
+
+ONE_SIDED_SECOND_DASHPOT = _with_dashpot(
+    ONE_SIDED_SECOND,
+    "SECOND",
+    "a second stop, at another place, with a dashpot beside its spring",
 )
 
 SPRING_GAP = Effect(
@@ -392,10 +438,13 @@ EFFECTS = (
     PRELOAD,
     END_STOP,
     END_STOP_CONTACT,
+    END_STOP_DASHPOT,
     ONE_SIDED,
     ONE_SIDED_CONTACT,
+    ONE_SIDED_DASHPOT,
     ONE_SIDED_SECOND,
     ONE_SIDED_SECOND_CONTACT,
+    ONE_SIDED_SECOND_DASHPOT,
     SPRING_GAP,
     COGGING,
     COGGING_ABOUT_MEAN,

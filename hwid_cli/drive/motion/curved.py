@@ -29,7 +29,16 @@ from hwid_cli.drive.motion.push import (
     value_of,
 )
 from hwid_cli.drive.motion.runge_kutta import LONGEST_PHASE, runge_kutta_stage
-from hwid_cli.drive.motion.springs import beyond, beyond_side, reaches_side, spring_rate
+from hwid_cli.drive.motion.springs import (
+    beyond,
+    beyond_side,
+    is_second_straight,
+    is_side_straight,
+    is_stop_straight,
+    reaches_side,
+    spring_rate,
+    touch,
+)
 from hwid_cli.drive.motion.state import (
     DEFLECTION,
     MOTOR_V,
@@ -99,14 +108,12 @@ def is_curved_here(state: np.ndarray, memory: np.ndarray, p: np.ndarray) -> bool
 @compiled(**INNER)
 def _touches(x: float, p: np.ndarray) -> bool:
     """Whether the drive is in a contact whose force is curved."""
-    is_bent = p[slots.STOP_BEND] + p[slots.STOP_LOSS] != 0.0
-    if is_bent and beyond(x, p[slots.STOP_POSITION]) != 0.0:
+    if not is_stop_straight(p) and beyond(x, p[slots.STOP_POSITION]) != 0.0:
         return True
-    is_bent = p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] != 0.0
-    if is_bent and beyond_side(x, p[slots.SIDE_POSITION]) != 0.0:
+    if not is_side_straight(p) and beyond_side(x, p[slots.SIDE_POSITION]) != 0.0:
         return True
-    is_bent = p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] != 0.0
-    return is_bent and beyond_side(x, p[slots.SECOND_POSITION]) != 0.0
+    is_in_second = beyond_side(x, p[slots.SECOND_POSITION]) != 0.0
+    return is_in_second and not is_second_straight(p)
 
 
 @compiled(**INNER)
@@ -117,18 +124,21 @@ def _contact_rate(
     into = beyond(x, p[slots.STOP_POSITION])
     if into == 0.0 and max(high, -low) > p[slots.STOP_POSITION]:
         into = JUST_IN
-    bend, loss = p[slots.STOP_BEND], p[slots.STOP_LOSS]
-    rate = _rate_of_contact(into, v, mass, p[slots.STOP_STIFFNESS], bend, loss)
+    loss, dashpot = p[slots.STOP_LOSS], p[slots.STOP_DASHPOT]
+    law = p[slots.STOP_STIFFNESS], p[slots.STOP_BEND], loss, dashpot
+    rate = _rate_of_contact(into, v, mass, law)
     into = beyond_side(x, p[slots.SIDE_POSITION])
     if into == 0.0 and reaches_side(low, high, p[slots.SIDE_POSITION]):
         into = JUST_IN
-    bend, loss = p[slots.SIDE_BEND], p[slots.SIDE_LOSS]
-    rate += _rate_of_contact(into, v, mass, p[slots.SIDE_STIFFNESS], bend, loss)
+    loss, dashpot = p[slots.SIDE_LOSS], p[slots.SIDE_DASHPOT]
+    law = p[slots.SIDE_STIFFNESS], p[slots.SIDE_BEND], loss, dashpot
+    rate += _rate_of_contact(into, v, mass, law)
     into = beyond_side(x, p[slots.SECOND_POSITION])
     if into == 0.0 and reaches_side(low, high, p[slots.SECOND_POSITION]):
         into = JUST_IN
-    bend, loss = p[slots.SECOND_BEND], p[slots.SECOND_LOSS]
-    return rate + _rate_of_contact(into, v, mass, p[slots.SECOND_STIFFNESS], bend, loss)
+    loss, dashpot = p[slots.SECOND_LOSS], p[slots.SECOND_DASHPOT]
+    law = p[slots.SECOND_STIFFNESS], p[slots.SECOND_BEND], loss, dashpot
+    return rate + _rate_of_contact(into, v, mass, law)
 
 
 @compiled(**INNER)
@@ -151,18 +161,24 @@ def _places_ahead(
 
 @compiled(**INNER)
 def _rate_of_contact(
-    into: float, v: float, mass: float, stiffness: float, bend: float, loss: float
+    into: float, v: float, mass: float, law: tuple[float, float, float, float]
 ) -> float:
-    """Return it for one contact, with its stiffness where the speed will be used up."""
-    if into == 0.0 or bend + loss == 0.0:
+    """Return it for one contact, with its stiffness where the speed will be used up.
+
+    Parameters
+    ----------
+    law : tuple of float
+        Stiffness, exponent less 1, loss and dashpot.
+    """
+    stiffness, bend, loss, dashpot = law
+    if into == 0.0 or bend + loss + dashpot == 0.0:
         return 0.0
     exponent = 1.0 + bend
     energy = 0.5 * (exponent + 1.0) * mass * v * v / stiffness
     deep = abs(into) + np.power(energy, 1.0 / (exponent + 1.0))
     steep = stiffness * np.power(deep, bend) * (1.0 + loss * abs(v))
-    return CONTACT_FINER * (
-        np.sqrt(exponent * steep / mass) + loss * steep * deep / mass
-    )
+    damping = loss * steep * deep + dashpot
+    return CONTACT_FINER * (np.sqrt(exponent * steep / mass) + damping / mass)
 
 
 @compiled(**INNER)
@@ -393,6 +409,8 @@ def step_plain(
         Since the start of the piece, and length of the step.
     p : ndarray, shape (N_SLOTS,)
     """
+    if p[slots.HAS_CONTACT] != 0.0:
+        touch(x, memory, p)
     if p[slots.DRIVE_VARIES] != 0.0 or p[slots.OWN_FORCE] != 0.0:
         return _step_varying(x, v, memory, push, done, h, p)
     half, inverse = 0.5 * h, 1.0 / p[slots.MASS]
@@ -493,6 +511,8 @@ def step_all(
         Whether position and velocity of the mass stay as they are.
     p : ndarray, shape (N_SLOTS,)
     """
+    if p[slots.HAS_CONTACT] != 0.0:
+        touch(state[X], memory, p)
     if p[slots.MODE_MASS] == 0.0 and not depends_on_motion(p):
         _step_coupled(state, trial, memory, push, done, h, is_held, p)
         return

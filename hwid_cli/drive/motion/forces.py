@@ -239,7 +239,7 @@ def resisting(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> float:
     if way != 0.0:
         force += way * sliding_friction(way, v, p)
     if p[slots.HAS_MORE] != 0.0:
-        force += memory[SIDE] * p[slots.PRELOAD] + contact_damping(x, v, p)
+        force += memory[SIDE] * p[slots.PRELOAD] + contact_damping(x, v, memory, p)
         force += way * friction_here(x, p)
     return force
 

@@ -9,6 +9,11 @@ import numpy as np
 
 from hwid_cli.compiled import INNER, MAKING, compiled
 from hwid_cli.drive import slots
+from hwid_cli.drive.motion.springs import (
+    is_second_straight,
+    is_side_straight,
+    is_stop_straight,
+)
 from hwid_cli.drive.motion.state import N_STATE
 
 # Inputs of a step: offsets of gaps and stops, force on the mass, cubic of the drive,
@@ -32,11 +37,11 @@ def fastest(p: np.ndarray) -> float:
     p : ndarray, shape (N_SLOTS,)
     """
     mass, stiffness = p[slots.MASS], p[slots.STIFFNESS]
-    if p[slots.STOP_BEND] + p[slots.STOP_LOSS] == 0.0:
+    if is_stop_straight(p):
         stiffness += p[slots.STOP_STIFFNESS]
-    if p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] == 0.0:
+    if is_side_straight(p):
         stiffness += p[slots.SIDE_STIFFNESS]
-    if p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] == 0.0:
+    if is_second_straight(p):
         stiffness += p[slots.SECOND_STIFFNESS]
     damping = p[slots.DAMPING]
     if p[slots.GEAR_STIFFNESS] > 0.0:

@@ -312,6 +312,8 @@ def take_stock(sample_time: float, p: np.ndarray) -> None:
     p[slots.HAS_FURTHER_EDGES] = 1.0 if has_edges else 0.0
     contact = p[slots.STOP_BEND] + p[slots.SIDE_BEND] + p[slots.SECOND_BEND]
     contact += p[slots.STOP_LOSS] + p[slots.SIDE_LOSS] + p[slots.SECOND_LOSS]
+    contact += p[slots.STOP_DASHPOT] + p[slots.SIDE_DASHPOT]
+    contact += p[slots.SECOND_DASHPOT]
     p[slots.HAS_CONTACT] = 1.0 if contact > 0.0 else 0.0
     has_second = p[slots.SECOND_STIFFNESS] > 0.0
     has_second = has_second or p[slots.SECOND_COGGING_FORCE] != 0.0

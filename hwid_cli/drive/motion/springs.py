@@ -8,6 +8,7 @@ import numpy as np
 from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
 from hwid_cli.drive.motion.push import TURN
+from hwid_cli.drive.motion.state import IN_SECOND, IN_SIDE, IN_STOP
 
 
 @compiled(**INNER)
@@ -70,20 +71,52 @@ def spring_rate(x: float, low: float, high: float, p: np.ndarray) -> float:
     if p[slots.CUBIC] != 0.0 or p[slots.QUADRATIC] != 0.0:
         bend = 3.0 * p[slots.CUBIC] * x + 2.0 * p[slots.QUADRATIC]
         stiffness += abs(bend * x)
-    is_plain = p[slots.STOP_BEND] + p[slots.STOP_LOSS] == 0.0
-    if is_plain and max(high, -low) > p[slots.STOP_POSITION]:
+    if is_stop_straight(p) and max(high, -low) > p[slots.STOP_POSITION]:
         stiffness += p[slots.STOP_STIFFNESS]
-    is_plain = p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] == 0.0
-    if is_plain and reaches_side(low, high, p[slots.SIDE_POSITION]):
+    if is_side_straight(p) and reaches_side(low, high, p[slots.SIDE_POSITION]):
         stiffness += p[slots.SIDE_STIFFNESS]
     if p[slots.HAS_MORE] != 0.0:
         stiffness += abs(p[slots.GRAVITY_TORQUE])
         stiffness += p[slots.SPRING_SHARE] * p[slots.STIFFNESS]
-        if p[slots.SECOND_STIFFNESS] > 0.0:
-            is_plain = p[slots.SECOND_BEND] + p[slots.SECOND_LOSS] == 0.0
-            if is_plain and reaches_side(low, high, p[slots.SECOND_POSITION]):
-                stiffness += p[slots.SECOND_STIFFNESS]
+        # Not there it has no stiffness to add.
+        edge = p[slots.SECOND_POSITION]
+        if is_second_straight(p) and reaches_side(low, high, edge):
+            stiffness += p[slots.SECOND_STIFFNESS]
     return stiffness
+
+
+@compiled(**INNER)
+def is_stop_straight(p: np.ndarray) -> bool:
+    """Return whether the stop on both sides is a spring alone.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return p[slots.STOP_BEND] + p[slots.STOP_LOSS] + p[slots.STOP_DASHPOT] == 0.0
+
+
+@compiled(**INNER)
+def is_side_straight(p: np.ndarray) -> bool:
+    """Return whether the stop on one side is a spring alone.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    return p[slots.SIDE_BEND] + p[slots.SIDE_LOSS] + p[slots.SIDE_DASHPOT] == 0.0
+
+
+@compiled(**INNER)
+def is_second_straight(p: np.ndarray) -> bool:
+    """Return whether the second stop on one side is a spring alone.
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    loss = p[slots.SECOND_LOSS] + p[slots.SECOND_DASHPOT]
+    return p[slots.SECOND_BEND] + loss == 0.0
 
 
 @compiled(**INNER)
@@ -146,29 +179,73 @@ def bent(into: float, bend: float) -> float:
 
 
 @compiled(**INNER)
-def contact_damping(x: float, v: float, p: np.ndarray) -> float:
+def contact_damping(x: float, v: float, memory: np.ndarray, p: np.ndarray) -> float:
     """Return what the damping of stops adds to their force; they never pull.
 
     Parameters
     ----------
     x : float, [m]
     v : float, [m/s]
+    memory : ndarray, shape (N_MEMORY,)
+        With the contacts of ``touch``: a dashpot's force begins with a jump, which no
+        step may meet half-way.
     p : ndarray, shape (N_SLOTS,)
     """
     force = 0.0
-    if p[slots.STOP_LOSS] > 0.0:
+    if p[slots.STOP_LOSS] + p[slots.STOP_DASHPOT] > 0.0:
         into = beyond(x, p[slots.STOP_POSITION])
         elastic = p[slots.STOP_STIFFNESS] * bent(into, p[slots.STOP_BEND])
-        force += elastic * max(p[slots.STOP_LOSS] * np.sign(into) * v, -1.0)
-    if p[slots.SIDE_LOSS] > 0.0:
+        loss, dashpot = p[slots.STOP_LOSS], p[slots.STOP_DASHPOT]
+        force += _damping_of(elastic, v, memory[IN_STOP], loss, dashpot)
+    if p[slots.SIDE_LOSS] + p[slots.SIDE_DASHPOT] > 0.0:
         into = beyond_side(x, p[slots.SIDE_POSITION])
         elastic = p[slots.SIDE_STIFFNESS] * bent(into, p[slots.SIDE_BEND])
-        force += elastic * max(p[slots.SIDE_LOSS] * np.sign(into) * v, -1.0)
-    if p[slots.SECOND_LOSS] > 0.0:
+        loss, dashpot = p[slots.SIDE_LOSS], p[slots.SIDE_DASHPOT]
+        force += _damping_of(elastic, v, memory[IN_SIDE], loss, dashpot)
+    if p[slots.SECOND_LOSS] + p[slots.SECOND_DASHPOT] > 0.0:
         into = beyond_side(x, p[slots.SECOND_POSITION])
         elastic = p[slots.SECOND_STIFFNESS] * bent(into, p[slots.SECOND_BEND])
-        force += elastic * max(p[slots.SECOND_LOSS] * np.sign(into) * v, -1.0)
+        loss, dashpot = p[slots.SECOND_LOSS], p[slots.SECOND_DASHPOT]
+        force += _damping_of(elastic, v, memory[IN_SECOND], loss, dashpot)
     return force
+
+
+@compiled(**INNER)
+def _damping_of(
+    elastic: float, v: float, side: float, loss: float, dashpot: float
+) -> float:
+    """Return it for one contact: losses go with its force, a dashpot acts beside it.
+
+    Parameters
+    ----------
+    elastic : float, [N]
+        Force of its spring, with its sign.
+    side : float
+        On which the drive touched it when the step began; 0 where it did not.
+    """
+    force = elastic * max(loss * np.sign(elastic) * v, -1.0)
+    if dashpot > 0.0 and side != 0.0:
+        force += side * max(dashpot * side * v, -abs(elastic))
+    return force
+
+
+@compiled(**INNER)
+def touch(x: float, memory: np.ndarray, p: np.ndarray) -> None:
+    """Note in which contacts with a dashpot the drive is as a step begins.
+
+    Parameters
+    ----------
+    x : float, [m]
+    memory : ndarray, shape (N_MEMORY,)
+        Changed in place.
+    p : ndarray, shape (N_SLOTS,)
+    """
+    if p[slots.STOP_DASHPOT] > 0.0:
+        memory[IN_STOP] = np.sign(beyond(x, p[slots.STOP_POSITION]))
+    if p[slots.SIDE_DASHPOT] > 0.0:
+        memory[IN_SIDE] = np.sign(beyond_side(x, p[slots.SIDE_POSITION]))
+    if p[slots.SECOND_DASHPOT] > 0.0:
+        memory[IN_SECOND] = np.sign(beyond_side(x, p[slots.SECOND_POSITION]))
 
 
 @compiled(**INNER)

@@ -135,7 +135,10 @@ enum {
     SENSOR_LAG_DAMPING_RATIO = 131,
     IRON = 132,
     IS_STRIBECK_EXPONENTIAL = 133,
-    N_SLOTS = 134,
+    STOP_DASHPOT = 134,
+    SIDE_DASHPOT = 135,
+    SECOND_DASHPOT = 136,
+    N_SLOTS = 137,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -197,7 +200,10 @@ enum {
     SIDE = 5,
     LAG_RATE = 6,
     LEVEL = 7,
-    N_MEMORY = 8,
+    IN_STOP = 8,
+    IN_SIDE = 9,
+    IN_SECOND = 10,
+    N_MEMORY = 11,
     MOST_TRIES = 120,
     NARROWING = 90,
     MOST_TURNS = 60,
@@ -1305,64 +1311,108 @@ static double drive_spring_force(double x, double *p)
     return force;
 }
 
+static int drive_is_stop_straight(double *p)
+{
+    return ((p[STOP_BEND] + p[STOP_LOSS]) + p[STOP_DASHPOT]) == 0.0;
+}
+
+static int drive_is_side_straight(double *p)
+{
+    return ((p[SIDE_BEND] + p[SIDE_LOSS]) + p[SIDE_DASHPOT]) == 0.0;
+}
+
 static int drive_reaches_side(double low, double high, double position)
 {
     return (drive_beyond_side(low, position) != 0.0) || (drive_beyond_side(high, position) != 0.0);
+}
+
+static int drive_is_second_straight(double *p)
+{
+    double loss = 0.0;
+    loss = p[SECOND_LOSS] + p[SECOND_DASHPOT];
+    return (p[SECOND_BEND] + loss) == 0.0;
 }
 
 static double drive_spring_rate(double x, double low, double high, double *p)
 {
     double stiffness = 0.0;
     double bend = 0.0;
-    int is_plain = 0;
+    double edge = 0.0;
     stiffness = p[STIFFNESS];
     if ((p[CUBIC] != 0.0) || (p[QUADRATIC] != 0.0)) {
         bend = ((3.0 * p[CUBIC]) * x) + (2.0 * p[QUADRATIC]);
         stiffness += fabs(bend * x);
     }
-    is_plain = (p[STOP_BEND] + p[STOP_LOSS]) == 0.0;
-    if (is_plain && (most(high, -low) > p[STOP_POSITION])) {
+    if (drive_is_stop_straight(p) && (most(high, -low) > p[STOP_POSITION])) {
         stiffness += p[STOP_STIFFNESS];
     }
-    is_plain = (p[SIDE_BEND] + p[SIDE_LOSS]) == 0.0;
-    if (is_plain && drive_reaches_side(low, high, p[SIDE_POSITION])) {
+    if (drive_is_side_straight(p) && drive_reaches_side(low, high, p[SIDE_POSITION])) {
         stiffness += p[SIDE_STIFFNESS];
     }
     if (p[HAS_MORE] != 0.0) {
         stiffness += fabs(p[GRAVITY_TORQUE]);
         stiffness += p[SPRING_SHARE] * p[STIFFNESS];
-        if (p[SECOND_STIFFNESS] > 0.0) {
-            is_plain = (p[SECOND_BEND] + p[SECOND_LOSS]) == 0.0;
-            if (is_plain && drive_reaches_side(low, high, p[SECOND_POSITION])) {
-                stiffness += p[SECOND_STIFFNESS];
-            }
+        edge = p[SECOND_POSITION];
+        if (drive_is_second_straight(p) && drive_reaches_side(low, high, edge)) {
+            stiffness += p[SECOND_STIFFNESS];
         }
     }
     return stiffness;
 }
 
-static double drive_contact_damping(double x, double v, double *p)
+static double drive_damping_of(double elastic, double v, double side, double loss, double dashpot)
+{
+    double force = 0.0;
+    force = elastic * most((loss * sign_of(elastic)) * v, -1.0);
+    if ((dashpot > 0.0) && (side != 0.0)) {
+        force += side * most((dashpot * side) * v, -fabs(elastic));
+    }
+    return force;
+}
+
+static double drive_contact_damping(double x, double v, double *memory, double *p)
 {
     double force = 0.0;
     double into = 0.0;
     double elastic = 0.0;
+    double loss = 0.0;
+    double dashpot = 0.0;
     force = 0.0;
-    if (p[STOP_LOSS] > 0.0) {
+    if ((p[STOP_LOSS] + p[STOP_DASHPOT]) > 0.0) {
         into = drive_beyond(x, p[STOP_POSITION]);
         elastic = p[STOP_STIFFNESS] * drive_bent_motion(into, p[STOP_BEND]);
-        force += elastic * most((p[STOP_LOSS] * sign_of(into)) * v, -1.0);
+        loss = p[STOP_LOSS];
+        dashpot = p[STOP_DASHPOT];
+        force += drive_damping_of(elastic, v, memory[IN_STOP], loss, dashpot);
     }
-    if (p[SIDE_LOSS] > 0.0) {
+    if ((p[SIDE_LOSS] + p[SIDE_DASHPOT]) > 0.0) {
         into = drive_beyond_side(x, p[SIDE_POSITION]);
         elastic = p[SIDE_STIFFNESS] * drive_bent_motion(into, p[SIDE_BEND]);
-        force += elastic * most((p[SIDE_LOSS] * sign_of(into)) * v, -1.0);
+        loss = p[SIDE_LOSS];
+        dashpot = p[SIDE_DASHPOT];
+        force += drive_damping_of(elastic, v, memory[IN_SIDE], loss, dashpot);
     }
-    if (p[SECOND_LOSS] > 0.0) {
+    if ((p[SECOND_LOSS] + p[SECOND_DASHPOT]) > 0.0) {
         into = drive_beyond_side(x, p[SECOND_POSITION]);
         elastic = p[SECOND_STIFFNESS] * drive_bent_motion(into, p[SECOND_BEND]);
-        force += elastic * most((p[SECOND_LOSS] * sign_of(into)) * v, -1.0);
+        loss = p[SECOND_LOSS];
+        dashpot = p[SECOND_DASHPOT];
+        force += drive_damping_of(elastic, v, memory[IN_SECOND], loss, dashpot);
     }
     return force;
+}
+
+static void drive_touch(double x, double *memory, double *p)
+{
+    if (p[STOP_DASHPOT] > 0.0) {
+        memory[IN_STOP] = sign_of(drive_beyond(x, p[STOP_POSITION]));
+    }
+    if (p[SIDE_DASHPOT] > 0.0) {
+        memory[IN_SIDE] = sign_of(drive_beyond_side(x, p[SIDE_POSITION]));
+    }
+    if (p[SECOND_DASHPOT] > 0.0) {
+        memory[IN_SECOND] = sign_of(drive_beyond_side(x, p[SECOND_POSITION]));
+    }
 }
 
 static double drive_ripple(double angle, double *p)
@@ -1443,7 +1493,7 @@ static double drive_resisting(double x, double v, double *memory, double *p)
         force += way * drive_sliding_friction(way, v, p);
     }
     if (p[HAS_MORE] != 0.0) {
-        force += (memory[SIDE] * p[PRELOAD]) + drive_contact_damping(x, v, p);
+        force += (memory[SIDE] * p[PRELOAD]) + drive_contact_damping(x, v, memory, p);
         force += way * drive_friction_here(x, p);
     }
     return force;
@@ -2236,17 +2286,15 @@ static int drive_is_always_curved(double *p)
 
 static int drive_touches(double x, double *p)
 {
-    int is_bent = 0;
-    is_bent = (p[STOP_BEND] + p[STOP_LOSS]) != 0.0;
-    if (is_bent && (drive_beyond(x, p[STOP_POSITION]) != 0.0)) {
+    int is_in_second = 0;
+    if ((!drive_is_stop_straight(p)) && (drive_beyond(x, p[STOP_POSITION]) != 0.0)) {
         return 1;
     }
-    is_bent = (p[SIDE_BEND] + p[SIDE_LOSS]) != 0.0;
-    if (is_bent && (drive_beyond_side(x, p[SIDE_POSITION]) != 0.0)) {
+    if ((!drive_is_side_straight(p)) && (drive_beyond_side(x, p[SIDE_POSITION]) != 0.0)) {
         return 1;
     }
-    is_bent = (p[SECOND_BEND] + p[SECOND_LOSS]) != 0.0;
-    return is_bent && (drive_beyond_side(x, p[SECOND_POSITION]) != 0.0);
+    is_in_second = drive_beyond_side(x, p[SECOND_POSITION]) != 0.0;
+    return is_in_second && (!drive_is_second_straight(p));
 }
 
 static int drive_is_curved_here(double *state, double *memory, double *p)
@@ -2271,49 +2319,65 @@ static int drive_is_curved_here(double *state, double *memory, double *p)
     return (p[HAS_CONTACT] != 0.0) && drive_touches(state[X], p);
 }
 
-static double drive_rate_of_contact(double into, double v, double mass, double stiffness, double bend, double loss)
+static double drive_rate_of_contact(double into, double v, double mass, tuple_dddd law)
 {
+    tuple_dddd t1 = {0};
+    double stiffness = 0.0;
+    double bend = 0.0;
+    double loss = 0.0;
+    double dashpot = 0.0;
     double exponent = 0.0;
     double energy = 0.0;
     double deep = 0.0;
     double steep = 0.0;
-    if ((into == 0.0) || ((bend + loss) == 0.0)) {
+    double damping = 0.0;
+    t1 = law;
+    stiffness = t1.m0;
+    bend = t1.m1;
+    loss = t1.m2;
+    dashpot = t1.m3;
+    if ((into == 0.0) || (((bend + loss) + dashpot) == 0.0)) {
         return 0.0;
     }
     exponent = 1.0 + bend;
     energy = ((((0.5 * (exponent + 1.0)) * mass) * v) * v) / stiffness;
     deep = fabs(into) + pow(energy, 1.0 / (exponent + 1.0));
     steep = (stiffness * pow(deep, bend)) * (1.0 + (loss * fabs(v)));
-    return 2.0 * (sqrt((exponent * steep) / mass) + (((loss * steep) * deep) / mass));
+    damping = ((loss * steep) * deep) + dashpot;
+    return 2.0 * (sqrt((exponent * steep) / mass) + (damping / mass));
 }
 
 static double drive_contact_rate(double x, double low, double high, double v, double mass, double *p)
 {
     double into = 0.0;
-    double bend = 0.0;
     double loss = 0.0;
+    double dashpot = 0.0;
+    tuple_dddd law = {0};
     double rate = 0.0;
     into = drive_beyond(x, p[STOP_POSITION]);
     if ((into == 0.0) && (most(high, -low) > p[STOP_POSITION])) {
         into = 1e-300;
     }
-    bend = p[STOP_BEND];
     loss = p[STOP_LOSS];
-    rate = drive_rate_of_contact(into, v, mass, p[STOP_STIFFNESS], bend, loss);
+    dashpot = p[STOP_DASHPOT];
+    law = (tuple_dddd){p[STOP_STIFFNESS], p[STOP_BEND], loss, dashpot};
+    rate = drive_rate_of_contact(into, v, mass, law);
     into = drive_beyond_side(x, p[SIDE_POSITION]);
     if ((into == 0.0) && drive_reaches_side(low, high, p[SIDE_POSITION])) {
         into = 1e-300;
     }
-    bend = p[SIDE_BEND];
     loss = p[SIDE_LOSS];
-    rate += drive_rate_of_contact(into, v, mass, p[SIDE_STIFFNESS], bend, loss);
+    dashpot = p[SIDE_DASHPOT];
+    law = (tuple_dddd){p[SIDE_STIFFNESS], p[SIDE_BEND], loss, dashpot};
+    rate += drive_rate_of_contact(into, v, mass, law);
     into = drive_beyond_side(x, p[SECOND_POSITION]);
     if ((into == 0.0) && drive_reaches_side(low, high, p[SECOND_POSITION])) {
         into = 1e-300;
     }
-    bend = p[SECOND_BEND];
     loss = p[SECOND_LOSS];
-    return rate + drive_rate_of_contact(into, v, mass, p[SECOND_STIFFNESS], bend, loss);
+    dashpot = p[SECOND_DASHPOT];
+    law = (tuple_dddd){p[SECOND_STIFFNESS], p[SECOND_BEND], loss, dashpot};
+    return rate + drive_rate_of_contact(into, v, mass, law);
 }
 
 static tuple_dd drive_places_ahead(double *state, double *memory, double *push, double done, double *p)
@@ -2693,6 +2757,9 @@ static tuple_dd drive_step_plain(double x, double v, double *memory, double *pus
     double v4 = 0.0;
     double k4 = 0.0;
     double sixth = 0.0;
+    if (p[HAS_CONTACT] != 0.0) {
+        drive_touch(x, memory, p);
+    }
     if ((p[DRIVE_VARIES] != 0.0) || (p[OWN_FORCE] != 0.0)) {
         return drive_step_varying(x, v, memory, push, done, h, p);
     }
@@ -2826,6 +2893,9 @@ static void drive_step_all(double *state, double *trial, double *memory, double 
     double circuit = 0.0;
     double total[N_STATE];
     double slope[N_STATE];
+    if (p[HAS_CONTACT] != 0.0) {
+        drive_touch(state[X], memory, p);
+    }
     if ((p[MODE_MASS] == 0.0) && (!drive_depends_on_motion(p))) {
         drive_step_coupled(state, trial, memory, push, done, h, is_held, p);
         return;
@@ -2884,13 +2954,13 @@ static double drive_fastest(double *p)
     double both = 0.0;
     mass = p[MASS];
     stiffness = p[STIFFNESS];
-    if ((p[STOP_BEND] + p[STOP_LOSS]) == 0.0) {
+    if (drive_is_stop_straight(p)) {
         stiffness += p[STOP_STIFFNESS];
     }
-    if ((p[SIDE_BEND] + p[SIDE_LOSS]) == 0.0) {
+    if (drive_is_side_straight(p)) {
         stiffness += p[SIDE_STIFFNESS];
     }
-    if ((p[SECOND_BEND] + p[SECOND_LOSS]) == 0.0) {
+    if (drive_is_second_straight(p)) {
         stiffness += p[SECOND_STIFFNESS];
     }
     damping = p[DAMPING];
@@ -3569,6 +3639,8 @@ static void drive_take_stock(double sample_time, double *p)
     p[HAS_FURTHER_EDGES] = has_edges ? 1.0 : 0.0;
     contact = (p[STOP_BEND] + p[SIDE_BEND]) + p[SECOND_BEND];
     contact += (p[STOP_LOSS] + p[SIDE_LOSS]) + p[SECOND_LOSS];
+    contact += p[STOP_DASHPOT] + p[SIDE_DASHPOT];
+    contact += p[SECOND_DASHPOT];
     p[HAS_CONTACT] = (contact > 0.0) ? 1.0 : 0.0;
     has_second = p[SECOND_STIFFNESS] > 0.0;
     has_second = has_second || (p[SECOND_COGGING_FORCE] != 0.0);

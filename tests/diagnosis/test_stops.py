@@ -1,4 +1,4 @@
-"""A slide between two stops that differ: solved by the classical Runge-Kutta method."""
+"""A slide with stops of other laws: solved by the classical Runge-Kutta method."""
 
 import numpy as np
 import pytest
@@ -10,6 +10,8 @@ STEP_S, N, FINE, NOISE = 5e-4, 1600, 40, 5e-5
 MASS, DAMPING, STIFFNESS, FORCE_CONSTANT = 0.8, 25.0, 3000.0, 40.0
 # Position [m], stiffness [N/m], damping [s/m].
 UPPER, LOWER = (0.009, 8e5, 0.5), (-0.006, 3e5, 0.5)
+# Position [m], stiffness [N/m], damping [N s/m].
+ELECTRODE = (0.007, 6e4, 70.0)
 GIVEN = SimulationOptions(
     mass_kg=MASS,
     damping_N_s_per_m=22.0,
@@ -40,7 +42,7 @@ def commands():
     }
 
 
-def force(x, v):
+def between_stops(x, v):
     """Of both stops, on all slides, [N]: depth times stiffness, damped, never pulling."""
     (upper, k_upper, c_upper), (lower, k_lower, c_lower) = UPPER, LOWER
     push = np.maximum(k_upper * (x - upper) * (1 + c_upper * v), 0) * (x > upper)
@@ -48,8 +50,20 @@ def force(x, v):
     return pull - push
 
 
-def measured():
-    """What a sensor reads of the slide under all commands."""
+def against_electrode(x, v):
+    """Of a spring with a dashpot beside it, on all slides, [N]; never pulling."""
+    edge, stiffness, damping = ELECTRODE
+    return -np.maximum(stiffness * (x - edge) + damping * v, 0) * (x > edge)
+
+
+def measured(force):
+    """What a sensor reads of the slide under all commands.
+
+    Parameters
+    ----------
+    force : callable
+        Of the stops, from positions and velocities.
+    """
     names = list(commands())
     u = np.array([commands()[name] for name in names])
     x, v, h = np.zeros(len(names)), np.zeros(len(names)), STEP_S / FINE
@@ -81,7 +95,7 @@ def measured():
 def test_two_unequal_stops_are_one_kind_of_stop_twice():
     allowed = ("end_stop", "one_sided_stop", "coulomb_friction")
     options = DiagnoseOptions(effects=allowed, max_effects=2)
-    found = diagnose(measured(), GIVEN, options)
+    found = diagnose(measured(between_stops), GIVEN, options)
     assert [one.id for one in found.effects] == ["one_sided_stop"] * 2
     assert found.complete
     sides = sorted(
@@ -92,3 +106,19 @@ def test_two_unequal_stops_are_one_kind_of_stop_twice():
         assert side["position_m"].value == pytest.approx(position, rel=2e-3)
         assert side["stiffness_N_per_m"].value == pytest.approx(stiffness, rel=0.1)
         assert side["damping_s_per_m"].low < damping < side["damping_s_per_m"].high
+
+
+@pytest.mark.thorough
+def test_a_stop_with_a_dashpot_is_one_stop():
+    allowed = ("end_stop", "one_sided_stop", "cubic_stiffness", "coulomb_friction")
+    found = diagnose(
+        measured(against_electrode), GIVEN, DiagnoseOptions(effects=allowed)
+    )
+    assert [one.id for one in found.effects] == ["one_sided_stop"]
+    assert found.complete
+    values = {one.name: one for one in found.effects[0].parameters}
+    # The step of the reference goes into the contact once: 0.1 % of its damping.
+    for name, true in zip(
+        ("position_m", "stiffness_N_per_m", "damping_N_s_per_m"), ELECTRODE, strict=True
+    ):
+        assert values[name].value == pytest.approx(true, rel=5e-3)
