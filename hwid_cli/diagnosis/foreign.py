@@ -213,7 +213,9 @@ def _found(
         if alone.findings is not None and alone.is_all:
             return alone.findings, alone.values, True
         if is_first and have_moved(values, alone.values, _MOVED):
-            return found, alone.values, False
+            # What runs bear out stays unless a search from there leaves less.
+            told = alone.findings
+            return told or found, alone.values, told is not None
         # Nothing more to look for: no gap, or parameters.
         if found.verdict.word in ("none", "parameters"):
             return confirm(found, runs, values)

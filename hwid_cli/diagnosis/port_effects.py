@@ -7,7 +7,7 @@ docs/method_diagnosis.md, eq. (D32c).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,11 +26,57 @@ from hwid_cli.drive.simulation import parameter_vector
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.programs import FreeParameter, SimulatorRun
 
+# Training recordings that effects at the ports are tried on first.
+_FEW = 2
 
-def with_port_effect(
+
+@dataclass(frozen=True, eq=False)
+class PortStart:
+    """An effect at a port as a few recordings tell it, to go on from.
+
+    Parameters
+    ----------
+    fit : CandidateFit
+        Of the effect to the stand-in.
+    values : dict of str to float
+        Of the simulation's parameters and of the effect's.
+    left : float, [-]
+        Mean square that it leaves of these recordings, over that of the noise.
+    """
+
+    fit: CandidateFit
+    values: dict[str, float]
+    left: float
+
+
+def port_effect(
+    findings: Findings, effect: str, values: Mapping[str, float]
+) -> CandidateFit:
+    """An effect at a port alone, with values to start from.
+
+    Parameters
+    ----------
+    effect : str
+        Id of the entry.
+    values : mapping of str to float
+        Of its parameters, by their names.
+    """
+    base = without_base(findings.base)
+    return replace(
+        base,
+        effects=(effect,),
+        names=(*base.names, *(ParameterRef(effect, name) for name in values)),
+        values=np.r_[base.values, list(values.values())],
+        valleys=np.zeros((0, 0)),
+    )
+
+
+def begin_at_port(
     findings: Findings, fit: CandidateFit, runs: Runs, values: dict[str, float]
-) -> Turn | None:
-    """Best run with an effect at a port, fitted together with the parameters.
+) -> PortStart | None:
+    """Fit an effect at a port and the parameters to the recordings that move most.
+
+    A hopeless one is known by then, for a part of the runs.
 
     Parameters
     ----------
@@ -41,22 +87,56 @@ def with_port_effect(
 
     Returns
     -------
-    Turn or None
-        None where the simulation gives no answer, or what it leaves is not less than
-        without the effect.
+    PortStart or None
+        None where the simulation gives no answer, or leaves more than without the effect.
     """
     search = _Search(findings, without_base(fit), runs)
     best = search.best_of(search.starts(values))
     if best is None:
         return None
-    signals, base = findings.problem.signals, findings.base.sse.tolist()
-    without = dict(zip((one.name for one in signals), base, strict=True))
-    found = fit_beside(search.ask, signals, search.free, best, without)
+    few = moving_most(findings.problem.signals)
+    found = fit_beside(search.ask, few, search.free, best, _left_without(findings))
+    if found is None:
+        return None
+    floors = findings.criteria.floors.tolist()
+    noise = dict(
+        zip((one.name for one in findings.problem.signals), floors, strict=True)
+    )
+    squares = sum(noise[one.name] for one in few)
+    left = cost_of(search.ask, few, found) / squares if squares else np.inf
+    return PortStart(fit, found, left)
+
+
+def with_port_effect(findings: Findings, start: PortStart, runs: Runs) -> Turn | None:
+    """Best run with an effect at a port, fitted together with the parameters.
+
+    Returns
+    -------
+    Turn or None
+        None where the simulation gives no answer, or what it leaves is not less than
+        without the effect.
+    """
+    search = _Search(findings, without_base(start.fit), runs)
+    signals, without = findings.problem.signals, _left_without(findings)
+    found = fit_beside(search.ask, signals, search.free, start.values, without)
     begun = None if found is None else search.begun(found)
     turn = None if begun is None else best_turn(findings, begun, runs)
     if turn is None or turn.tried is None:
         return None
     return None if turn.sse.sum() >= findings.base.sse.sum() else turn
+
+
+def moving_most(signals: Sequence[Signals]) -> list[Signals]:
+    """The training recordings that effects at the ports are tried on first."""
+    train = [one for one in signals if not one.is_held_out]
+    train.sort(key=lambda one: -float(np.ptp(one.compared)))
+    return train[:_FEW]
+
+
+def _left_without(findings: Findings) -> dict[str, float]:
+    """What is left of each recording without the effect, [output unit squared]."""
+    names = (one.name for one in findings.problem.signals)
+    return dict(zip(names, findings.base.sse.tolist(), strict=True))
 
 
 def run_with_port_effect(

@@ -7,14 +7,18 @@ docs/method_diagnosis.md, eq. (D32d).
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import with_values, without_base
+from hwid_cli.diagnosis.candidate import with_values
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.own_parameters import errors_of, linearised
-from hwid_cli.diagnosis.port_effects import run_with_port_effect
+from hwid_cli.diagnosis.port_effects import (
+    moving_most,
+    port_effect,
+    run_with_port_effect,
+)
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import acts_at_port
@@ -22,8 +26,6 @@ from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.programs import SimulatorRun
 
-# Training recordings that they are tried on: those that move most.
-_MOST_RECORDINGS = 2
 # Of what the simulation leaves of these, a likely effect leaves at most this share, [-].
 _CLEARLY_LESS = 0.35
 # Of so many that leave less than this share, sizes between the start values are tried, which
@@ -73,9 +75,7 @@ def screened_at_ports(
     ----------
     docs/method_diagnosis.md, eq. (D32d).
     """
-    signals = [one for one in findings.problem.signals if not one.is_held_out]
-    signals.sort(key=lambda one: -float(np.ptp(one.compared)))
-    signals = signals[:_MOST_RECORDINGS]
+    signals = moving_most(findings.problem.signals)
     found = runs.tried(signals, values)
     gap = linearised(runs.tried, signals, runs.simulator.free, values)
     if found is None or gap is None:
@@ -123,16 +123,9 @@ def _refined(
 
 def _starts(findings: Findings) -> list[CandidateFit]:
     """Every effect at a port that was looked for, with each of its sizes."""
-    base = without_base(findings.base)
     looked_for = [one for (one,) in findings.found.shares if acts_at_port((one,))]
     return [
-        replace(
-            base,
-            effects=(effect,),
-            names=(*base.names, *(ParameterRef(effect, name) for name in start)),
-            values=np.r_[base.values, list(start.values())],
-            valleys=np.zeros((0, 0)),
-        )
+        port_effect(findings, effect, start)
         for effect in looked_for
         if public_id(effect) == effect
         for start in CATALOGUE[effect].starts(findings.scales)

@@ -7,12 +7,18 @@ docs/method_diagnosis.md, eq. (D33).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import compress
 
 import numpy as np
 
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
-from hwid_cli.diagnosis.port_effects import with_port_effect
+from hwid_cli.diagnosis.port_effects import (
+    PortStart,
+    begin_at_port,
+    port_effect,
+    with_port_effect,
+)
 from hwid_cli.diagnosis.port_screening import AtPorts, screened_at_ports
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED,
@@ -31,6 +37,7 @@ from hwid_cli.diagnosis.turns import Turn, fit_of_run
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.diagnosis import STILL_LARGE
 
 # Single effects that the simulation is run with: at most so many different ones, of those that leave at
 # most so many times what the best one leaves beside the stand-in, which counts as at least
@@ -93,6 +100,7 @@ def single_in_simulation(
     if not any(criteria.is_nearly_all(one, base) for one in likely):
         tried.keep(_at_ports_by_runs_alone(tried, runs, values))
     _try_likely(tried, likely, runs, values, on_round)
+    tried.keep(_at_ports_later(tried, runs))
     tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
     decided = _decided(findings, tried.turns, tried.fits)
     if decided is not None:
@@ -110,9 +118,11 @@ class _Tried:
         self.findings = findings
         self.turns: dict[tuple[str, ...], Turn] = {}
         self.fits: dict[tuple[str, ...], CandidateFit] = {}
-        # Effects at the ports that were fitted through runs, and what was asked before.
+        # Effects at the ports that were fitted through runs, what was asked before, and
+        # which of them wait.
         self.through_runs: set[tuple[str, ...]] = set()
         self.at_ports = AtPorts()
+        self.later: list[PortStart] = []
 
     def is_told_by_ports(self, one: CandidateFit) -> bool:
         """Whether runs leave nothing with another effect at a port, and much with this one."""
@@ -166,7 +176,9 @@ def _in_simulation(
     findings, found = tried.findings, list[Turn]()
     is_open = one.effects not in tried.through_runs
     if acts_at_port(one.effects) and runs.simulator.free and is_open:
-        found = _through_runs(tried, one, runs, values)
+        tried.through_runs.add(one.effects)
+        start = begin_at_port(findings, one, runs, values)
+        found = [] if start is None else _through_runs(tried, start, runs)
         if tried.are_nearly_all(found) or runs.run_tasks.are_spent:
             return found
     rival = min((fit.sse.sum() for fit in tried.fits.values()), default=np.inf)
@@ -202,24 +214,76 @@ def _twins_in_simulation(
 def _at_ports_by_runs_alone(
     tried: _Tried, runs: Runs, values: dict[str, float]
 ) -> list[Turn]:
-    """Effects at the ports that the simulation calls likely, whatever its stand-in says."""
+    """Effects at the ports that the simulation calls likely, whatever its stand-in says.
+
+    Those that leave much of a few recordings wait until others have been tried.
+    """
     found: list[Turn] = []
     if runs.run_tasks.are_spent:
         return found
     tried.at_ports = screened_at_ports(tried.findings, runs, values)
+    starts: list[PortStart] = []
     for one in tried.at_ports.likely[:_MOST_BY_RUNS]:
+        if runs.run_tasks.are_spent:
+            break
+        begun = begin_at_port(tried.findings, one, runs, values)
+        starts += [] if begun is None else [begun]
+    for start in sorted(starts, key=lambda one: one.left):
         if tried.are_nearly_all(found) or runs.run_tasks.are_spent:
             break
-        found += _through_runs(tried, one, runs, values)
+        if start.left > STILL_LARGE**2:
+            tried.later.append(start)
+            continue
+        found += _through_runs(tried, start, runs)
+    return [*found, *_with_wider_law(tried, found, runs)]
+
+
+def _at_ports_later(tried: _Tried, runs: Runs) -> list[Turn]:
+    """Effects at the ports that have waited, where nothing else is all that is missing."""
+    found: list[Turn] = []
+    for start in tried.later:
+        is_done = start.fit.effects in tried.through_runs
+        done = [*tried.turns.values(), *found]
+        if is_done or runs.run_tasks.are_spent or tried.are_nearly_all(done):
+            continue
+        found += _through_runs(tried, start, runs)
     return found
 
 
-def _through_runs(
-    tried: _Tried, one: CandidateFit, runs: Runs, values: dict[str, float]
-) -> list[Turn]:
+def _with_wider_law(tried: _Tried, turns: Sequence[Turn], runs: Runs) -> list[Turn]:
+    """Run with a richer law of the effect that leaves least, if that is still too much.
+
+    A lag of first order leaves most of what one of second order has: without the latter
+    others that leave no less would be as likely.
+    """
+    findings = tried.findings
+    if not turns or tried.are_nearly_all(turns) or runs.run_tasks.are_spent:
+        return []
+    best = min(turns, key=lambda turn: float(turn.sse.sum()))
+    fit = fit_of_run(findings, best)
+    (effect,) = fit.effects
+    wider = [
+        one
+        for one, entry in CATALOGUE.items()
+        if effect in entry.contains and public_id(one) == public_id(effect)
+        if (one,) in findings.found.shares and acts_at_port((one,))
+    ]
+    found: list[Turn] = []
+    for one in wider[:1]:
+        of_effect = [ref.owner == effect for ref in fit.names]
+        names = [ref.parameter for ref in compress(fit.names, of_effect)]
+        known = dict(zip(names, fit.values[of_effect].tolist(), strict=True))
+        start = CATALOGUE[one].starts(findings.scales)[0]
+        wide = port_effect(findings, one, {**start, **known})
+        begun = begin_at_port(findings, wide, runs, best.values_of_run)
+        found += [] if begun is None else _through_runs(tried, begun, runs)
+    return found
+
+
+def _through_runs(tried: _Tried, start: PortStart, runs: Runs) -> list[Turn]:
     """Best run with an effect at a port, fitted through runs; none where it leaves more."""
-    tried.through_runs.add(one.effects)
-    turn = with_port_effect(tried.findings, one, runs, values)
+    tried.through_runs.add(start.fit.effects)
+    turn = with_port_effect(tried.findings, start, runs)
     return [] if turn is None else [turn]
 
 

@@ -21,7 +21,7 @@ from hwid_cli.trust.judged import (
 )
 
 # Of what is known of a model's errors, whichever stage asks for it.
-TRUST_VERSION = 2
+TRUST_VERSION = 3
 
 
 def trust_of(

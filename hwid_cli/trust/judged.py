@@ -149,11 +149,14 @@ def left_out_bands(
 
 
 def _gain(one: Judgement) -> float:
-    """Part of the error that is a share of the output, [-]."""
+    """Part of the error that is a share of the output, [-]; at most all of it.
+
+    Where a model foresees next to no motion the error is no share of it.
+    """
     level = level_of(one.terms)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         gain = float(level @ one.errors / (level @ level))
-    return gain if np.isfinite(gain) else 0.0
+    return float(np.clip(gain, -1.0, 1.0)) if np.isfinite(gain) else 0.0
 
 
 def _scores(one: Judgement, trust: ModelTrust) -> np.ndarray:

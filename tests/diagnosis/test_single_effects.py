@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis import single_effects
+from hwid_cli.diagnosis.port_effects import PortStart
 from hwid_cli.diagnosis.port_screening import AtPorts
 from hwid_cli.diagnosis.single_effects import (
     _is_settled_by,
@@ -16,6 +17,7 @@ from hwid_cli.diagnosis.single_effects import (
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import ParameterRef
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
+from tests.drive.drive_cases import SCALES
 
 # In the order in which they leave least beside the stand-in.
 LIKELY = {
@@ -58,6 +60,8 @@ def test_an_effect_at_a_port_is_fitted_through_runs_first(
     def by_turns(findings, one, runs, values, rival):
         turns.append(one.effects[0])
 
+    start = SimpleNamespace(fit=lag)
+    monkeypatch.setattr(single_effects, "begin_at_port", lambda *_: start)
     monkeypatch.setattr(single_effects, "with_port_effect", lambda *_: run)
     monkeypatch.setattr(single_effects, "fit_of_run", lambda findings, turn: turn)
     monkeypatch.setattr(single_effects, "settled", by_turns)
@@ -233,3 +237,72 @@ def test_of_likely_effects_the_simple_ones_are_run_first():
     findings = findings_of({"elastic_coupling:load": 101.0, "input_delay": 102.0})
     found = [one.effects[0] for one in _likely(findings)]
     assert found == ["input_delay", "elastic_coupling:load"]
+
+
+def tried_at_ports(monkeypatch, lefts, sses, shares=()):
+    """What is fitted through runs, of effects that screening calls likely.
+
+    Parameters
+    ----------
+    lefts, sses : dict of str to float
+        What each leaves of few recordings, over the noise, and of all of them.
+    shares : sequence of str
+        Effects that were looked for.
+    """
+    findings = SimpleNamespace(
+        criteria=CRITERIA,
+        base=base(900.0),
+        scales=SCALES,
+        found=SimpleNamespace(shares={(one,): 0.1 for one in shares}),
+    )
+    runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
+    likely = tuple(made_up((one,), 100.0) for one in list(lefts)[:2])
+    fitted = []
+
+    def begin(_findings, one, _runs, values):
+        return PortStart(one, values, lefts[one.effects[0]])
+
+    def fit(_findings, start, _runs):
+        (effect,) = start.fit.effects
+        fitted.append(effect)
+        white = 0.5 if sses[effect] <= 100.0 else 9.0
+        run = made_up((effect,), sses[effect], whiteness=white)
+        return SimpleNamespace(fit=run, sse=run.sse, values_of_run={})
+
+    monkeypatch.setattr(
+        single_effects, "screened_at_ports", lambda *_: AtPorts({}, likely)
+    )
+    monkeypatch.setattr(single_effects, "begin_at_port", begin)
+    monkeypatch.setattr(single_effects, "with_port_effect", fit)
+    monkeypatch.setattr(single_effects, "fit_of_run", lambda _, turn: turn.fit)
+    tried = single_effects._Tried(findings)
+    tried.keep(single_effects._at_ports_by_runs_alone(tried, runs, {}))
+    first = list(fitted)
+    tried.keep(single_effects._at_ports_later(tried, runs))
+    return first, fitted[len(first) :]
+
+
+def test_what_leaves_much_of_few_recordings_waits_until_others_have_been_tried(
+    monkeypatch,
+):
+    lefts = {"input_saturation": 90.0, "sensor_lag": 4.0}
+    sses = {"input_saturation": 500.0, "sensor_lag": 300.0}
+    found = tried_at_ports(monkeypatch, lefts, sses)
+    assert found == (["sensor_lag"], ["input_saturation"])
+    # Not at all where the first one leaves nothing.
+    sses = {"input_saturation": 500.0, "sensor_lag": 100.0}
+    assert tried_at_ports(monkeypatch, lefts, sses) == (["sensor_lag"], [])
+
+
+def test_the_richer_law_follows_where_the_plain_one_leaves_too_much(monkeypatch):
+    richer = "sensor_lag:second_order"
+    lefts = {"input_delay": 80.0, "sensor_lag": 3.0, richer: 1.0}
+    sses = {"input_delay": 500.0, "sensor_lag": 200.0, richer: 100.0}
+    found = tried_at_ports(monkeypatch, lefts, sses, shares=("sensor_lag", richer))
+    assert found == (["sensor_lag", richer], [])
+    # Only where it was asked for, and where something is left.
+    found = tried_at_ports(monkeypatch, lefts, sses, shares=("sensor_lag",))
+    assert found == (["sensor_lag"], ["input_delay"])
+    sses["sensor_lag"] = 100.0
+    found = tried_at_ports(monkeypatch, lefts, sses, shares=("sensor_lag", richer))
+    assert found == (["sensor_lag"], [])
