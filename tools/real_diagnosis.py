@@ -29,8 +29,8 @@ HEAD = """# Diagnoses of real measurements
 
 Written by `make real` (needs the data, see [configs/README.md](../configs/README.md)); the configurations are
 `configs/diagnose_*.yaml`. Each simulation is deliberately poor: inertia and viscous friction, or a linear oscillator. The table says
-which effects are named, with which parameters, and how far the error falls on held-out recordings (stage version {version}, seconds of
-two processes). Where nothing is named, the sentence below the table has the best lead:
+which effects are named, with which parameters, and how far the error falls on held-out recordings (stage version {version}). The
+seconds are those of this run, with whatever else the machine did. Where nothing is named, the sentence below the table has the best lead:
 """
 
 

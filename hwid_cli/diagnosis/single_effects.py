@@ -177,7 +177,8 @@ def _in_simulation(
     is_open = one.effects not in tried.through_runs
     if acts_at_port(one.effects) and runs.simulator.free and is_open:
         tried.through_runs.add(one.effects)
-        start = begin_at_port(findings, one, runs, values)
+        waiting = (each for each in tried.later if each.fit.effects == one.effects)
+        start = next(waiting, None) or begin_at_port(findings, one, runs, values)
         found = [] if start is None else _through_runs(tried, start, runs)
         if tried.are_nearly_all(found) or runs.run_tasks.are_spent:
             return found
