@@ -94,6 +94,8 @@ from hwid_cli.records.recordings import Recording
 # Searches that may follow each other: the first, one beside a better base or a held
 # command, and one behind the filter for noise of the input.
 MOST_SEARCHES = 3
+# Times the noise that a law leaves at most which takes the place of larger sets.
+_LEFT_BY_SHORT_LAW = 2.0
 _BEHIND_INPUT = (
     "compared is the output behind the logged input: in the controller's command hardly "
     "anything of this shows"
@@ -339,6 +341,8 @@ def _behind_noise_filter(
     rounds, criteria = searched.rounds, searched.rounds.criteria
     if not searched.has_gap or criteria.standing is not None or options.laws == "only":
         return None
+    if searched.has_short_law:
+        return None
     verdict = decided(rounds, searched.given_sse, searched.found)
     is_settled = verdict.is_complete or bool(verdict.chosen.cause)
     if is_settled or criteria.ratio(verdict.chosen) <= STILL_LARGE:
@@ -401,6 +405,8 @@ class _Searched:
         Best sets of each size on pieces; empty where these were not asked.
     smoothed : list of Smoothed
         Motion that pieces start from.
+    has_short_law : bool
+        Whether larger sets, pieces and filters were left out because a short law holds.
     """
 
     rounds: Rounds
@@ -410,6 +416,7 @@ class _Searched:
     found: RoundsResult
     seeds: tuple[CandidateFit, ...]
     smoothed: list[Smoothed]
+    has_short_law: bool = False
 
     @property
     def has_gap(self) -> bool:
@@ -508,7 +515,7 @@ def _beside(
         on_round,
     )
     searched = _Searched(rounds, given_sse, before, force, RoundsResult(), (), force)
-    return _on_whole_recordings(searched, options.max_effects)
+    return _on_whole_recordings(searched, options)
 
 
 def _with_odd_ones_trained(fitted: FittedBase) -> FittedBase:
@@ -521,9 +528,9 @@ def _with_odd_ones_trained(fitted: FittedBase) -> FittedBase:
     return fitted if problem is fitted.problem else fitted_base(problem)
 
 
-def _on_whole_recordings(searched: _Searched, max_effects: int) -> _Searched:
+def _on_whole_recordings(searched: _Searched, options: DiagnoseOptions) -> _Searched:
     """Look for sets of effects; from pieces first where the base imitates."""
-    rounds, found = searched.rounds, searched.found
+    rounds, found, max_effects = searched.rounds, searched.found, options.max_effects
     if not searched.has_gap:
         return searched
     criteria, known = rounds.criteria, None
@@ -543,19 +550,52 @@ def _on_whole_recordings(searched: _Searched, max_effects: int) -> _Searched:
     may_be_enough = rounds.problem.may_be_held and rounds.problem.drive.hold == LINE
 
     def is_enough(so_far: RoundsResult) -> bool:
-        return may_be_enough and is_settled_if_held(rounds, so_far)
+        if may_be_enough and is_settled_if_held(rounds, so_far):
+            return True
+        return len(so_far.best) < max_effects and _has_short_law(
+            replace(searched, found=so_far), options
+        )
 
     if criteria.is_close_to_noise(rounds.base):
         # A third of the noise holds no set of effects.
         max_effects = min(max_effects, 1)
     found = run_rounds(rounds, max_effects, is_enough, known)
-    return replace(searched, found=found)
+    searched = replace(searched, found=found)
+    is_cut_short = len(found.best) < max_effects
+    has_law = is_cut_short and _has_short_law(searched, options)
+    return replace(searched, has_short_law=has_law)
+
+
+def _has_short_law(searched: _Searched, options: DiagnoseOptions) -> bool:
+    """Whether a law leaves little where all sets of as many effects leave much.
+
+    Larger sets, which take most of the time, would only imitate it.
+    """
+    rounds, found = searched.rounds, searched.found
+    is_open = _may_be_law(options) and rounds.criteria.standing is None
+    if not is_open or not found.best:
+        return False
+    if rounds.criteria.ratio(found.best[-1]) <= STILL_LARGE:
+        return False
+    verdict = decided(rounds, searched.given_sse, found)
+    told, _, law = find_law(
+        rounds, searched.before, searched.force, found, verdict, len(found.best)
+    )
+    is_law = law is not None
+    return is_law and rounds.criteria.ratio(told.chosen) <= _LEFT_BY_SHORT_LAW
+
+
+def _may_be_law(options: DiagnoseOptions) -> bool:
+    """Whether formulas are asked for; who asks for some effects only wants none instead."""
+    return options.laws == "auto" and options.effects is None
 
 
 def _with_pieces(searched: _Searched, max_effects: int) -> _Searched:
     """Look in pieces of the recordings, too, where whole ones settle nothing."""
     rounds, found = searched.rounds, searched.found
-    if not searched.has_gap or rounds.problem.compares_command:
+    if not searched.has_gap or searched.has_short_law:
+        return searched
+    if rounds.problem.compares_command:
         return searched
     verdict = decided(rounds, searched.given_sse, found)
     if not is_lost(rounds.criteria, verdict, rounds.base):
@@ -587,9 +627,7 @@ def _judged(searched: _Searched, options: DiagnoseOptions) -> Findings:
         judged = judged_in_pieces(rounds, whole, seeds, searched.smoothed)
         if judged is not None:
             return judged
-    # Who asks for some effects only wants no formula instead.
-    is_open = options.laws == "auto" and options.effects is None
-    if is_open or options.laws == "only":
+    if _may_be_law(options) or options.laws == "only":
         verdict, found, law = find_law(rounds, before, force, found, verdict)
         whole = replace(whole, found=found, verdict=verdict, law=law)
     return _with_residual_noise(whole)

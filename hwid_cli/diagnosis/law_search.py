@@ -205,8 +205,13 @@ class _Responses:
         return states
 
 
-def best_subsets(found: Regression) -> list[list[Subset]]:
+def best_subsets(found: Regression, most_terms: int = MOST_TERMS) -> list[list[Subset]]:
     """Best subsets of each size, the best first.
+
+    Parameters
+    ----------
+    most_terms : int
+        Of the largest ones.
 
     Returns
     -------
@@ -216,7 +221,7 @@ def best_subsets(found: Regression) -> list[list[Subset]]:
     matrix, vector, whole = _reduced(found, found.grams.sum(axis=0))
     usable = [place for place in range(len(found.terms)) if matrix[place, place] > 0]
     ranked: list[list[Subset]] = []
-    for size in range(1, MOST_TERMS + 1):
+    for size in range(1, most_terms + 1):
         if size < MOST_TERMS:
             sets = np.array(list(combinations(usable, size)), dtype=int)
         else:

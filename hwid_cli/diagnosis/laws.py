@@ -134,6 +134,7 @@ def find_law(
     smoothed: Sequence[Smoothed],
     found: RoundsResult,
     verdict: DiagnosisVerdict,
+    most_terms: int = MOST_TERMS,
 ) -> tuple[DiagnosisVerdict, RoundsResult, LawFound | None]:
     """Look for a law where the catalogue leaves something.
 
@@ -143,6 +144,8 @@ def find_law(
         All recordings beside the fitted base, and the motion as measured.
     found : RoundsResult
         What the catalogue's effects have led to.
+    most_terms : int
+        Of the law.
 
     Returns
     -------
@@ -152,14 +155,11 @@ def find_law(
         With the fits of laws.
     law : LawFound or None
     """
-    most = _most_terms(rounds, verdict)
+    most = min(_most_terms(rounds, verdict), most_terms)
     if most == 0:
         return verdict, found, None
     rounds.on_round("laws", 0)
-    likely = _likely(rounds, compared, smoothed)
-    best = _best(
-        rounds, _tried(rounds, [one for one in likely if len(one.terms) <= most])
-    )
+    best = _best(rounds, _tried(rounds, _likely(rounds, compared, smoothed, most)))
     if best is None or not _holds(rounds, best, found, verdict):
         return verdict, found, None
     best = _refined(rounds, best)
@@ -214,7 +214,10 @@ def _tried(rounds: Rounds, likely: Sequence[_Tried]) -> list[_Tried]:
 
 
 def _likely(
-    rounds: Rounds, compared: Sequence[Compared], smoothed: Sequence[Smoothed]
+    rounds: Rounds,
+    compared: Sequence[Compared],
+    smoothed: Sequence[Smoothed],
+    most_terms: int,
 ) -> list[_Tried]:
     """Best subsets of each size, of forces and of what the sensor adds."""
     drive, scales = rounds.baseline.drive, rounds.baseline.scales
@@ -230,7 +233,7 @@ def _likely(
         kinds.append((readings(scales), "output"))
     for terms, acts_on in kinds:
         columns = regression(of, motions, drive, terms, through=acts_on == "force")
-        for of_size in best_subsets(columns):
+        for of_size in best_subsets(columns, most_terms):
             tried += [
                 _as_effect(rounds, columns, one, acts_on)
                 for one in _different(columns, of_size)

@@ -171,7 +171,7 @@ def displaced(
 
     References
     ----------
-    docs/method.md, eqs. (15e)-(15f).
+    docs/method.md, eqs. (15i)-(15j).
     """
     before, after = RULES[model.input_map.kind], RULES[model.output_map.kind]
     if input_by != 0.0:

@@ -11,6 +11,7 @@ import sympy
 from hwid_cli import DiagnoseOptions, Recording, SimulationOptions, diagnose
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.load import experiment_of, load_experiment
+from hwid_cli.diagnosis import diagnose as diagnose_module
 from hwid_cli.diagnosis import law_names, laws, set_fits
 from hwid_cli.diagnosis.candidate import (
     compared_with_fit,
@@ -21,7 +22,7 @@ from hwid_cli.diagnosis.latent_force import latent_force
 from hwid_cli.diagnosis.law_search import MOST_TERMS
 from hwid_cli.diagnosis.law_terms import Term
 from hwid_cli.diagnosis.laws import _most_terms
-from hwid_cli.diagnosis.rounds import RoundsResult
+from hwid_cli.diagnosis.rounds import RoundsResult, run_rounds
 from hwid_cli.diagnosis.sentences import law_in_words
 from hwid_cli.diagnosis.set_fits import fit_task
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
@@ -96,6 +97,28 @@ def test_a_law_of_two_terms_is_found_with_units_intervals_and_inclusion(found):
         "*sign(v)) and something that is no effect of the catalogue"
         in diagnosis.summary
     )
+
+
+@pytest.mark.thorough
+def test_a_law_of_one_term_takes_the_place_of_sets_that_would_imitate_it(monkeypatch):
+    pull = Hidden(lambda x, v, u, t, way: 0.35 * u * u)
+    sizes = []
+
+    def spied(*of):
+        result = run_rounds(*of)
+        sizes.append(len(result.best))
+        return result
+
+    monkeypatch.setattr(diagnose_module, "run_rounds", spied)
+    found = diagnose(machine(pull), SIMULATION, DiagnoseOptions(max_effects=2))
+    assert (found.verdict, found.complete) == ("law", True)
+    (term,) = found.law.terms
+    assert term.term == "u**2"
+    # A share of the input: 0.35 N/A^2 over 5 N/A.
+    assert found.law.acts_on == "input"
+    assert term.value == pytest.approx(0.07, rel=0.02)
+    # No pair was looked for.
+    assert sizes == [1]
 
 
 @pytest.mark.thorough

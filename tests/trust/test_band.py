@@ -225,3 +225,11 @@ def step_pair():
     rng = np.random.default_rng(21)
     u = np.repeat([0.0, 1.0, 0.4], 100) + 0.01 * rng.standard_normal(300)
     return u, lfilter([0, 0.3], [1, -0.7], np.tanh(u)) + 0.01 * rng.standard_normal(300)
+
+
+def test_an_error_is_no_share_of_a_motion_that_is_not_foreseen(linear):
+    own, found = linear
+    judge = recording("judge", 10)
+    # The machine moves a hundred times as far as the model foresees.
+    judge = replace(judge, output=100.0 * judge.output)
+    assert model_trust(found, [own], [judge]).gain == 1.0
