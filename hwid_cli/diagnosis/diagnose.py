@@ -339,9 +339,7 @@ def _behind_noise_filter(
     None where it is not needed, or settles nothing either.
     """
     rounds, criteria = searched.rounds, searched.rounds.criteria
-    if not searched.has_gap or criteria.standing is not None or options.laws == "only":
-        return None
-    if searched.has_short_law:
+    if not searched.is_open or criteria.standing is not None or options.laws == "only":
         return None
     verdict = decided(rounds, searched.given_sse, searched.found)
     is_settled = verdict.is_complete or bool(verdict.chosen.cause)
@@ -423,6 +421,11 @@ class _Searched:
         """Whether the re-fitted base leaves something to explain."""
         base = self.rounds.base
         return base.is_usable and not self.rounds.criteria.needs_nothing(base)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether something is left that no short law holds."""
+        return self.has_gap and not self.has_short_law
 
     @property
     def best(self) -> CandidateFit | None:
@@ -549,21 +552,21 @@ def _on_whole_recordings(searched: _Searched, options: DiagnoseOptions) -> _Sear
             known = found
     may_be_enough = rounds.problem.may_be_held and rounds.problem.drive.hold == LINE
 
+    has_law = False
+
     def is_enough(so_far: RoundsResult) -> bool:
+        nonlocal has_law
         if may_be_enough and is_settled_if_held(rounds, so_far):
             return True
-        return len(so_far.best) < max_effects and _has_short_law(
-            replace(searched, found=so_far), options
-        )
+        if len(so_far.best) < max_effects:
+            has_law = _has_short_law(replace(searched, found=so_far), options)
+        return has_law
 
     if criteria.is_close_to_noise(rounds.base):
         # A third of the noise holds no set of effects.
         max_effects = min(max_effects, 1)
     found = run_rounds(rounds, max_effects, is_enough, known)
-    searched = replace(searched, found=found)
-    is_cut_short = len(found.best) < max_effects
-    has_law = is_cut_short and _has_short_law(searched, options)
-    return replace(searched, has_short_law=has_law)
+    return replace(searched, found=found, has_short_law=has_law)
 
 
 def _has_short_law(searched: _Searched, options: DiagnoseOptions) -> bool:
@@ -581,8 +584,8 @@ def _has_short_law(searched: _Searched, options: DiagnoseOptions) -> bool:
     told, _, law = find_law(
         rounds, searched.before, searched.force, found, verdict, len(found.best)
     )
-    is_law = law is not None
-    return is_law and rounds.criteria.ratio(told.chosen) <= _LEFT_BY_SHORT_LAW
+    left = rounds.criteria.ratio(told.chosen)
+    return law is not None and left <= _LEFT_BY_SHORT_LAW
 
 
 def _may_be_law(options: DiagnoseOptions) -> bool:
@@ -593,9 +596,7 @@ def _may_be_law(options: DiagnoseOptions) -> bool:
 def _with_pieces(searched: _Searched, max_effects: int) -> _Searched:
     """Look in pieces of the recordings, too, where whole ones settle nothing."""
     rounds, found = searched.rounds, searched.found
-    if not searched.has_gap or searched.has_short_law:
-        return searched
-    if rounds.problem.compares_command:
+    if not searched.is_open or rounds.problem.compares_command:
         return searched
     verdict = decided(rounds, searched.given_sse, found)
     if not is_lost(rounds.criteria, verdict, rounds.base):

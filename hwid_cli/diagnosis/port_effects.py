@@ -95,13 +95,11 @@ def begin_at_port(
     if best is None:
         return None
     few = moving_most(findings.problem.signals)
-    found = fit_beside(search.ask, few, search.free, best, _left_without(findings))
+    without = _by_name(findings, findings.base.sse)
+    found = fit_beside(search.ask, few, search.free, best, without)
     if found is None:
         return None
-    floors = findings.criteria.floors.tolist()
-    noise = dict(
-        zip((one.name for one in findings.problem.signals), floors, strict=True)
-    )
+    noise = _by_name(findings, findings.criteria.floors)
     squares = sum(noise[one.name] for one in few)
     left = cost_of(search.ask, few, found) / squares if squares else np.inf
     return PortStart(fit, found, left)
@@ -117,7 +115,8 @@ def with_port_effect(findings: Findings, start: PortStart, runs: Runs) -> Turn |
         without the effect.
     """
     search = _Search(findings, without_base(start.fit), runs)
-    signals, without = findings.problem.signals, _left_without(findings)
+    signals = findings.problem.signals
+    without = _by_name(findings, findings.base.sse)
     found = fit_beside(search.ask, signals, search.free, start.values, without)
     begun = None if found is None else search.begun(found)
     turn = None if begun is None else best_turn(findings, begun, runs)
@@ -133,10 +132,15 @@ def moving_most(signals: Sequence[Signals]) -> list[Signals]:
     return train[:_FEW]
 
 
-def _left_without(findings: Findings) -> dict[str, float]:
-    """What is left of each recording without the effect, [output unit squared]."""
+def _by_name(findings: Findings, each: np.ndarray) -> dict[str, float]:
+    """What belongs to each recording, by its name.
+
+    Parameters
+    ----------
+    each : ndarray, shape (n_recordings,), [output unit squared]
+    """
     names = (one.name for one in findings.problem.signals)
-    return dict(zip(names, findings.base.sse.tolist(), strict=True))
+    return dict(zip(names, each.tolist(), strict=True))
 
 
 def run_with_port_effect(

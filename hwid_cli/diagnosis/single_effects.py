@@ -7,10 +7,10 @@ docs/method_diagnosis.md, eq. (D33).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import compress
 
 import numpy as np
 
+from hwid_cli.diagnosis.candidate import fitted_effects
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.port_effects import (
@@ -263,22 +263,19 @@ def _with_wider_law(tried: _Tried, turns: Sequence[Turn], runs: Runs) -> list[Tu
     best = min(turns, key=lambda turn: float(turn.sse.sum()))
     fit = fit_of_run(findings, best)
     (effect,) = fit.effects
-    wider = [
+    wider = (
         one
         for one, entry in CATALOGUE.items()
         if effect in entry.contains and public_id(one) == public_id(effect)
         if (one,) in findings.found.shares and acts_at_port((one,))
-    ]
-    found: list[Turn] = []
-    for one in wider[:1]:
-        of_effect = [ref.owner == effect for ref in fit.names]
-        names = [ref.parameter for ref in compress(fit.names, of_effect)]
-        known = dict(zip(names, fit.values[of_effect].tolist(), strict=True))
-        start = CATALOGUE[one].starts(findings.scales)[0]
-        wide = port_effect(findings, one, {**start, **known})
-        begun = begin_at_port(findings, wide, runs, best.values_of_run)
-        found += [] if begun is None else _through_runs(tried, begun, runs)
-    return found
+    )
+    wide = next(wider, None)
+    if wide is None:
+        return []
+    values = CATALOGUE[wide].starts(findings.scales)[0] | fitted_effects(fit)[effect]
+    of_wide = port_effect(findings, wide, values)
+    start = begin_at_port(findings, of_wide, runs, best.values_of_run)
+    return [] if start is None else _through_runs(tried, start, runs)
 
 
 def _through_runs(tried: _Tried, start: PortStart, runs: Runs) -> list[Turn]:

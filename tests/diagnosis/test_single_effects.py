@@ -266,7 +266,10 @@ def tried_at_ports(monkeypatch, lefts, sses, shares=()):
         (effect,) = start.fit.effects
         fitted.append(effect)
         white = 0.5 if sses[effect] <= 100.0 else 9.0
-        run = made_up((effect,), sses[effect], whiteness=white)
+        names = [one.name for one in CATALOGUE[effect].parameters]
+        run = made_up((effect,), sses[effect], parameters=len(names), whiteness=white)
+        owned = tuple(ParameterRef(effect, name) for name in names)
+        run = replace(run, names=(*run.names[:3], *owned))
         return SimpleNamespace(fit=run, sse=run.sse, values_of_run={})
 
     monkeypatch.setattr(

@@ -150,15 +150,32 @@ ONE_SIDED = Effect(
 )
 
 
+def _damped(
+    stop: Effect, law: str, sentence: str, equation: str, *further: Parameter
+) -> Effect:
+    """The same stop with a richer law, which hits at several speeds tell."""
+    return replace(
+        stop,
+        id=f"{stop.id}_{law}" if stop.beside else f"{stop.id}:{law}",
+        sentence=sentence,
+        equation=f"F = {equation} at a depth d beyond the position, never pulling",
+        parameters=(*stop.parameters, *further),
+        confused_with={
+            **stop.confused_with,
+            "cubic_stiffness": "hits at several speeds",
+        },
+        contains=(stop.id, *stop.contains),
+    )
+
+
 def _contact(stop: Effect, slots: str, sentence: str) -> Effect:
     """The same stop with the law of a real contact."""
     return replace(
-        stop,
-        id=f"{stop.id}_contact" if stop.beside else f"{stop.id}:contact",
-        sentence=sentence,
-        equation="F = -ks d^n (1 + c d') at a depth d beyond the position, never pulling",
-        parameters=(
-            *stop.parameters,
+        _damped(
+            stop,
+            "contact",
+            sentence,
+            "-ks d^n (1 + c d')",
             Parameter(
                 "exponent",
                 lambda scales: (1.0, 1.5),
@@ -179,11 +196,6 @@ def _contact(stop: Effect, slots: str, sentence: str) -> Effect:
             ),
         ),
         derived={f"{slots}_BEND": bend},
-        confused_with={
-            **stop.confused_with,
-            "cubic_stiffness": "hits at several speeds",
-        },
-        contains=(stop.id, *stop.contains),
         size=_usual_force,
         seen=partial(_contact_starts, stop),
     )
@@ -191,33 +203,24 @@ def _contact(stop: Effect, slots: str, sentence: str) -> Effect:
 
 def _with_dashpot(stop: Effect, slots: str, sentence: str) -> Effect:
     """The same stop with a dashpot beside its spring."""
-    return replace(
+    return _damped(
         stop,
-        id=f"{stop.id}_dashpot" if stop.beside else f"{stop.id}:dashpot",
-        sentence=sentence,
-        equation="F = -(ks d + c d') at a depth d beyond the position, never pulling",
-        parameters=(
-            *stop.parameters,
-            Parameter(
-                "damping_N_s_per_m",
-                lambda scales: tuple(
-                    share * scales.force_N / scales.velocity_m_per_s
-                    for share in (0.3, 3.0)
-                ),
-                lambda scales: (
-                    1e-3 * scales.force_N / scales.velocity_m_per_s,
-                    1e3 * scales.force_N / scales.velocity_m_per_s,
-                ),
-                places=(f"{slots}_DASHPOT",),
-                default=0.0,
-                limits=(NOT_NEGATIVE,),
+        "dashpot",
+        sentence,
+        "-(ks d + c d')",
+        Parameter(
+            "damping_N_s_per_m",
+            lambda scales: tuple(
+                share * scales.force_N / scales.velocity_m_per_s for share in (0.3, 3.0)
             ),
+            lambda scales: (
+                1e-3 * scales.force_N / scales.velocity_m_per_s,
+                1e3 * scales.force_N / scales.velocity_m_per_s,
+            ),
+            places=(f"{slots}_DASHPOT",),
+            default=0.0,
+            limits=(NOT_NEGATIVE,),
         ),
-        confused_with={
-            **stop.confused_with,
-            "cubic_stiffness": "hits at several speeds",
-        },
-        contains=(stop.id, *stop.contains),
     )
 
 
