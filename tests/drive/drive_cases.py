@@ -104,6 +104,19 @@ TWO_STOPS = {
     "one_sided_stop": {"position_m": -0.008, "stiffness_N_per_m": 1e4},
     "one_sided_stop:second": {"position_m": 0.011, "stiffness_N_per_m": 3e4},
 }
+# Springs with a dashpot beside them.
+DASHPOTS = {
+    "one_sided_stop": {
+        "position_m": -0.008,
+        "stiffness_N_per_m": 1e4,
+        "damping_N_s_per_m": 30.0,
+    },
+    "one_sided_stop:second": {
+        "position_m": 0.011,
+        "stiffness_N_per_m": 3e4,
+        "damping_N_s_per_m": 8.0,
+    },
+}
 TWO_WAVES = {
     **COGGING,
     "cogging:second": {"amplitude_N": 0.3, "period_m": 2e-3, "phase_rad": -0.6},
@@ -146,6 +159,7 @@ VARIANTS = (
     DRIVE_LOAD,
     CONTACT,
     SIDE_CONTACT,
+    DASHPOTS,
     TWO_STOPS,
     TWO_WAVES,
     BOUC_WEN,
