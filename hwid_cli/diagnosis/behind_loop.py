@@ -8,7 +8,7 @@ docs/method_diagnosis.md, below eq. (D1a).
 import numpy as np
 
 from hwid_cli.diagnosis.candidate import rebuilt
-from hwid_cli.diagnosis.noise import differences_rms
+from hwid_cli.diagnosis.differences import differences_rms
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.drive.effect import Scales

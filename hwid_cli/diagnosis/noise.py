@@ -7,11 +7,16 @@ because differences see only its fast part. docs/method_diagnosis.md.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb
 
 import numpy as np
 import scipy
 
+from hwid_cli.diagnosis.differences import (
+    ORDER,
+    SEES_MOTION,
+    difference_rms,
+    differences_rms,
+)
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
 from hwid_cli.diagnosis.whiteness import (
     MORE_THAN_QUIETEST,
@@ -30,14 +35,9 @@ _FEWEST_RESTS = 3
 # What a motion that all rests begin with leaves of them is less than this share, and noise
 # shows as much in common with less than this probability, [-].
 _LEFT_OF_COMMON, _BY_CHANCE = 0.7, 1e-4
-# Orders of differences: the second where the first still sees motion or colour.
-_ORDER, _HIGHER_ORDER = 6, 16
-_SEES_MOTION = 0.7
 # Recordings whose noise differs by no more than this have the same: differences of a few
 # hundred samples tell it no better.
 _ALIKE = 1.5
-# A difference that is larger than this many standard deviations is a jump.
-_JUMP = 5.0
 # Bends of a signal below this share of its size are rounding.
 _ROUNDING = 1e-9
 # The grid of a sensor limits it while it makes this share of the noise or more: below,
@@ -86,7 +86,7 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
         found, method = rest, "rest"
     else:
         rms = differences
-        if rest is not None and 0 < rest.rms < _SEES_MOTION * differences:
+        if rest is not None and 0 < rest.rms < SEES_MOTION * differences:
             rms, method = rest.rms, "rest"
         else:
             method = "differences"
@@ -208,51 +208,14 @@ def quiet_input_rms(problem: DiagnosisProblem) -> float:
 
 def _is_mostly_straight(piece: np.ndarray) -> bool:
     """Whether most of a signal is on straight lines, up to rounding."""
-    bends = np.abs(np.diff(piece, _ORDER))
+    bends = np.abs(np.diff(piece, ORDER))
     rounding = _ROUNDING * float(np.max(np.abs(piece), initial=0.0))
     return bends.size > 0 and float(np.median(bends)) <= rounding
 
 
-def differences_rms(pieces: Sequence[np.ndarray], step: float) -> float:
-    """RMS of white noise, from differences of one order or a higher one.
-
-    The higher order where the lower one sees motion.
-
-    Parameters
-    ----------
-    pieces : sequence of ndarray, shape (n_samples,)
-        Of signals with their motion.
-    step : float
-        Of the sensor's grid, as noise; smaller differences are its rounding.
-    """
-    low = _difference_rms(pieces, _ORDER, step)
-    high = _difference_rms(pieces, _HIGHER_ORDER, step)
-    return high if 0 < high < _SEES_MOTION * low else low
-
-
-def _difference_rms(pieces: Sequence[np.ndarray], order: int, step: float) -> float:
-    """RMS of white noise from pooled differences of one order, without jumps."""
-    longer = [piece for piece in pieces if piece.size > order]
-    if not longer:
-        return 0.0
-    scale = np.sqrt(comb(2 * order, order))
-    found = [np.diff(piece, order) / scale for piece in longer]
-    # Of each piece: beside quiet ones, all of a noisy one would be jumps.
-    kept = np.concatenate([_without_jumps(one, step) for one in found])
-    return float(np.sqrt(np.mean(np.square(kept)))) if kept.size else 0.0
-
-
-def _without_jumps(differences: np.ndarray, step: float) -> np.ndarray:
-    """Differences without those that are far larger than most."""
-    size = np.abs(differences)
-    # 1.4826: from the median of the magnitudes to a standard deviation.
-    limit = _JUMP * max(1.4826 * float(np.median(size)), step)
-    return differences[size <= limit] if limit > 0 else differences
-
-
 def _upper_quartile(pieces: Sequence[np.ndarray], step: float) -> float:
     """RMS of noise on a grid: only fast recordings step through it and show it."""
-    found = [_difference_rms([piece], _ORDER, step) for piece in pieces]
+    found = [difference_rms([piece], ORDER, step) for piece in pieces]
     return float(np.quantile(found, 0.75))
 
 
@@ -284,7 +247,7 @@ def _grid_of(piece: np.ndarray) -> float:
     # that it is a motion whose own steps are multiples, as under a constant force.
     has_many = np.unique(np.round(ratios[ratios > 1.5])).size >= _FEWEST_MULTIPLES
     rounding = smallest / np.sqrt(12)
-    is_rounded = _difference_rms([piece], _ORDER, rounding) >= _GRID_SHARE * rounding
+    is_rounded = difference_rms([piece], ORDER, rounding) >= _GRID_SHARE * rounding
     return smallest if has_many and is_rounded else 0.0
 
 

@@ -218,12 +218,9 @@ def _keeps_current(drive: Drive, effects: Sequence[str]) -> bool:
 
 
 def _rests_anywhere(problem: DiagnosisProblem) -> bool:
-    """Whether recordings start at rest, but nothing says where: a free axis."""
-    return (
-        problem.start == "rest"
-        and problem.drive.stiffness_N_per_m == 0
-        and not problem.compares_command
-    )
+    """Whether recordings start at rest, but nothing says well where: a free axis."""
+    is_free = problem.start == "rest" and problem.drive.stiffness_N_per_m == 0
+    return is_free and (not problem.compares_command or problem.command_tells_start)
 
 
 def _base_unknowns(

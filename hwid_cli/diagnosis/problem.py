@@ -11,10 +11,18 @@ from typing import Protocol
 import numpy as np
 import scipy
 
+from hwid_cli.diagnosis.differences import differences_rms
 from hwid_cli.diagnosis.innovations import Whitening
 from hwid_cli.drive.simulation import NO_FORCE, refined
 from hwid_cli.records.axis import base_of, name_inside
-from hwid_cli.records.drive import LINE, SOURCES, UNSAID_HOLD, WINDING, Drive
+from hwid_cli.records.drive import (
+    LINE,
+    SOURCES,
+    UNSAID_HOLD,
+    WINDING,
+    Controller,
+    Drive,
+)
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.recordings import Recording
 
@@ -252,6 +260,9 @@ class DiagnosisProblem:
     may_be_held : bool
         Whether nobody has said how the command goes on between samples, so that the
         recordings may tell that it is held.
+    command_tells_start : bool
+        Whether the command that is compared shows where a recording starts better than
+        the sensor does.
     """
 
     signals: tuple[Signals, ...]
@@ -265,6 +276,7 @@ class DiagnosisProblem:
     n_damaged: int = 0
     damaged: tuple[str, ...] = ()
     may_be_held: bool = False
+    command_tells_start: bool = False
 
     @property
     def compares_command(self) -> bool:
@@ -416,7 +428,25 @@ def prepare(
         recordings[0].input_unit,
         {name_inside(name): share for name, share in simulation.known.items()},
         may_be_held=simulation.hold == UNSAID_HOLD and simulation.controller is None,
+        command_tells_start=_command_tells_start(drive.controller, signals),
     )
+
+
+def _command_tells_start(
+    controller: Controller | None, all_signals: Sequence[Signals]
+) -> bool:
+    """Whether a start that is off by the sensor's error shows in the command.
+
+    The controller may read a better sensor than the one that is logged, or the same one
+    with a noise that its command shows as well.
+    """
+    if controller is None or any(one.is_velocity for one in all_signals):
+        return False
+    at_rest = float(np.median([rest_length(one.driven_by) for one in all_signals]))
+    sensor = differences_rms([one.output for one in all_signals], 0.0)
+    command = differences_rms([one.compared for one in all_signals], 0.0)
+    error = sensor / np.sqrt(max(at_rest, 1.0))
+    return bool(controller.at_once_per_position * error > command)
 
 
 def _with_free_winding(drive: Drive) -> Drive:

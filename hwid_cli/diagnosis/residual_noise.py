@@ -11,12 +11,8 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from hwid_cli.diagnosis.noise import (
-    FEWEST_AT_REST,
-    Stretch,
-    differences_rms,
-    noise_sentence,
-)
+from hwid_cli.diagnosis.differences import differences_rms
+from hwid_cli.diagnosis.noise import FEWEST_AT_REST, Stretch, noise_sentence
 from hwid_cli.diagnosis.problem import Compared
 from hwid_cli.diagnosis.whiteness import (
     FALSE_ALARM,

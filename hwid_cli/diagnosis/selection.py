@@ -205,15 +205,20 @@ class SelectionCriteria:
     def evidence(self, found: CandidateFit, other: CandidateFit) -> Evidence:
         """How a candidate does against another one."""
         held = self.is_held_out
-        floor = self.floors[held].sum()
-        before, after = other.sse[held].sum(), found.sse[held].sum()
-        excess = before - floor
-        explained = (before - after) / excess if excess > 0 else 0.0
+        explained = self._explained(found, other, held)
         change = other.sse[held] - found.sse[held]
         # A stop that a recording never reaches says nothing there, for or against.
         affected = np.abs(change) > LEAST_CHANGE * np.mean(np.abs(change))
         improved = float(np.mean(change[affected] > 0)) if affected.any() else 0.0
-        return Evidence(self.gain(found, other), float(explained), improved)
+        return Evidence(self.gain(found, other), explained, improved)
+
+    def _explained(
+        self, found: CandidateFit, other: CandidateFit, rows: np.ndarray
+    ) -> float:
+        """Share of the other's excess over the noise in some recordings, [-]."""
+        before, after = other.sse[rows].sum(), found.sse[rows].sum()
+        excess = before - self.floors[rows].sum()
+        return float((before - after) / excess) if excess > 0 else 0.0
 
     def gain(self, found: CandidateFit, other: CandidateFit) -> float:
         """How much lower the criterion of a candidate is than another's.
@@ -360,10 +365,13 @@ class SelectionCriteria:
         """
         against = self.evidence(found, base)
         least = self._least_explained(found)
+        explained = against.explained
         if self.ratio(base) <= SMALL_REMAINDER:
             # So little a sensor that drifts leaves, too, and half of it is soon explained.
             least = max(least, LEAST_EXPLAINED_SET)
-        explains = against.explained >= least
+            # Held-out recordings that leave next to nothing are explained by chance.
+            explained = min(explained, self._explained(found, base, self._sides[1]))
+        explains = explained >= least
         return (
             against.gain >= LEAST_GAIN
             and (explains or self.leaves_noise(found))

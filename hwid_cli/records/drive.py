@@ -183,6 +183,13 @@ class Controller:
                 refusal = Refusal(None, "a number > 0", (name,), "missing", step=step)
                 raise Refused(refusal)
 
+    @property
+    def at_once_per_position(self) -> float:
+        """Command that an error of the position makes at once, [input unit/m]."""
+        if self.proportional_gain is not None:
+            return self.proportional_gain
+        return (self.position_gain_per_s or 0.0) * (self.velocity_gain or 0.0)
+
 
 @dataclass(frozen=True)
 class Drive:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.noise import differences_rms
+from hwid_cli.diagnosis.differences import differences_rms
 from hwid_cli.model.input_range import SAME_LEVEL, outside_share
 from hwid_cli.model.scores import fit_percent, rmsd
 from hwid_cli.model.simulate import validation_output

@@ -42,7 +42,7 @@ from hwid_cli.store.results import read_calibrated, write_calibrated
 from hwid_cli.tasks.cache import task_key
 
 NAME = "calibrate"
-STAGE_VERSION = 6
+STAGE_VERSION = 7
 
 # Two passes settle nearly every recording (the second one changes nothing); noise at a
 # threshold may take one or two more.

@@ -1,4 +1,5 @@
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -139,6 +140,49 @@ def test_resampling_interpolates_linearly_and_is_logged(caplog):
     np.testing.assert_allclose(found.input.values, 2 * np.arange(8), rtol=1e-15)
     np.testing.assert_allclose(found.output.values, -np.arange(8.0), rtol=1e-15)
     assert "data/run07.csv: resampled to 1 s, because 2 of 7 steps" in caplog.text
+
+
+@pytest.mark.parametrize("jitter", [0.03, 0.06, 0.15])
+def test_resampling_follows_a_fast_wave_between_its_samples(jitter):
+    rng = np.random.default_rng(7)
+    time = np.arange(2000) + rng.uniform(-jitter, jitter, 2000)
+    time[0] = 0.0
+
+    def wave(at, phase):
+        return np.sin(2 * np.pi * at / 15 + phase)
+
+    data = columns(time)
+    data = replace(
+        data,
+        input=array_column("u", wave(time, 1.0)),
+        output=array_column("y", wave(time, 0.0)),
+    )
+    stated = options(resample=True, sample_time_s=1.0, sampling_tolerance=0.01)
+    found, _ = sample_uniformly(PATH, data, stated)
+    grid = np.arange(found.output.values.size)
+    # Lines lie up to (2 pi / 15)^2 / 8 = 2 % below the tops.
+    np.testing.assert_allclose(found.output.values, wave(grid, 0.0), atol=5e-4)
+    np.testing.assert_allclose(found.input.values, wave(grid, 1.0), atol=5e-4)
+
+
+def test_resampling_draws_lines_where_samples_are_missing_and_beside_steps():
+    rng = np.random.default_rng(7)
+    time = np.arange(400) + rng.uniform(-0.04, 0.04, 400)
+    time = np.delete(time, [200, 201, 202])
+    time[0] = 0.0
+    smooth, steps = np.sin(2 * np.pi * time / 40), (time % 80 > 40) * 1.0
+    data = columns(time)
+    data = replace(
+        data, input=array_column("u", steps), output=array_column("y", smooth)
+    )
+    stated = options(resample=True, sample_time_s=1.0, sampling_tolerance=0.01)
+    found, _ = sample_uniformly(PATH, data, stated)
+    grid = np.arange(found.output.values.size)
+    missing = slice(200, 203)
+    line = np.interp(grid[missing], time, smooth)
+    np.testing.assert_allclose(found.output.values[missing], line, atol=1e-12)
+    # Means of lines, up to their rounding: a curve would leave the steps by 10 %.
+    assert -1e-12 < found.input.values.min() < found.input.values.max() < 1 + 1e-12
 
 
 def test_a_resampling_step_has_six_digits():

@@ -168,6 +168,17 @@ def test_one_effect_may_explain_less_than_two_must():
     assert CRITERIA.may_be_named(made_up(GOOD, 220.0), base())
 
 
+@pytest.mark.parametrize(("left", "is_named"), [(117.0, False), (103.0, True)])
+def test_a_gap_hardly_above_the_noise_is_explained_in_training_recordings_too(
+    left, is_named
+):
+    # Held-out recordings leave 2 % beyond their noise, and hardly anything with an effect.
+    small = base(np.where(HELD_OUT, 104.0, 120.0))
+    found = made_up(GOOD, np.where(HELD_OUT, 100.5, left))
+    assert all(rules(found, small).values())
+    assert CRITERIA.may_be_named(found, small) is is_named
+
+
 # A stand-in that may be wrong by 100 in all, beside an excess of 1800.
 ROUGH = replace(CRITERIA, stand_in_error=100.0)
 

@@ -185,6 +185,40 @@ def test_under_a_controller_nothing_is_named_where_nothing_is_missing():
     assert diagnosed(given, model).verdict == "none"
 
 
+def test_a_loop_starts_where_its_machine_stood_not_where_a_noisy_sensor_says():
+    # The controller knows the position exactly, the log within 0.1 mm: 50 A/m of its
+    # gain times that are 5 mA of the command's beginning, ten times its rounding.
+    position_gain, velocity_gain, constant = 10.0, 5.0, DRIVE.force_constant_N_per_A
+    mass, damping = DRIVE.mass_kg, DRIVE.damping_N_s_per_m
+    # Exact step of m dv/dt = F - c v under a held force.
+    decay = np.exp(-damping * STEP_S / mass)
+    rng = np.random.default_rng(3)
+    given = []
+    for number, period in enumerate((0.12, 0.2, 0.3, 0.25)):
+        stands = 0.25 + 2e-4 * number
+        time = STEP_S * np.arange(N)
+        path = stands + 0.02 * (
+            1 - np.cos(2 * np.pi * np.maximum(time - 0.03, 0) / period)
+        )
+        x, v = stands, 0.0
+        command, moved = np.zeros(N), np.zeros(N)
+        for k in range(N):
+            moved[k] = x
+            command[k] = velocity_gain * (position_gain * (path[k] - x) - v)
+            final = constant * command[k] / damping
+            x += final * STEP_S + (v - final) * (1 - decay) * mass / damping
+            v = final + (v - final) * decay
+        logged = moved + 1e-4 * rng.standard_normal(N)
+        given.append(
+            Recording(
+                f"path_{number}", command.round(3), logged, STEP_S, reference=path
+            )
+        )
+    controller = Controller(position_gain, velocity_gain)
+    found = diagnosed(given, simulation(stiffness_N_per_m=0.0, controller=controller))
+    assert found.verdict == "none"
+
+
 @pytest.mark.thorough
 def test_recordings_that_begin_in_motion_are_diagnosed():
     cut = [
