@@ -18,6 +18,7 @@ from hwid_cli.diagnosis.diagnose import find, held_out_of
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.further_effects import with_further_effect
 from hwid_cli.diagnosis.laws import MOST_OF_NAMED
+from hwid_cli.diagnosis.leads_in_simulation import leads_in_simulation
 from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence
@@ -44,8 +45,9 @@ from hwid_cli.records.recordings import Recording
 # Searches, each from where the last one has moved the parameters by more than this.
 MOST_SEARCHES = 3
 _MOVED = 0.01
-# Of all runs, those after which no further single effect is tried: sets need some, too.
-_FOR_SINGLES = 0.75
+# Of all runs, those after which no further single effect is tried: sets need some, too. Where
+# the configuration leaves their number open, sets have some beyond them.
+_FOR_SINGLES, _FOR_SETS = 0.75, 1.5
 # Verdicts that a law may take the place of.
 _NAMED = ("named", "ambiguous")
 # Factors of the stand-in that are none: as far as parameters are told, at most and at
@@ -221,12 +223,14 @@ def _found(
             return confirm(found, runs, values)
         alone = with_further_effect(alone, runs, options, on_round)
         is_told = alone.findings is not None
+        if options.max_runs is None:
+            runs = runs.up_to(_FOR_SETS)
         if runs.run_tasks.are_spent or (is_told and _is_enough(alone)):
             lead = _with_runs(unconfirmed(found), alone)
             return alone.findings or lead, alone.values, is_told
     else:
         standing = _with_nearer_spring(standing, singles, runs, on_round)
-    return _of_sets(standing, options, simulation, on_round, given_sse, alone)
+    return _of_sets(standing, options, (runs, values), on_round, given_sse, alone)
 
 
 def _is_enough(alone: ToldByRuns) -> bool:
@@ -269,6 +273,11 @@ def _of_sets(
     several = confirm(found, runs, values)
     if alone is None:
         return several
+    told, moved, is_confirmed = several
+    if not (is_confirmed and told.verdict.chosen.effects):
+        leads = leads_in_simulation(found, runs, values, on_round)
+        if leads.findings is not None:
+            several = leads.findings, leads.values, True
     if one is None or _leaves_less(several, one):
         told, moved, is_confirmed = several
         return _with_runs(told, alone), moved, is_confirmed

@@ -102,7 +102,7 @@ def single_in_simulation(
     _try_likely(tried, likely, runs, values, on_round)
     tried.keep(_at_ports_later(tried, runs))
     tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
-    decided = _decided(findings, tried.turns, tried.fits)
+    decided = decided_by_runs(findings, tried.turns, tried.fits)
     if decided is not None:
         told, moved = decided
         is_all = criteria.is_nearly_all(told.verdict.chosen, base)
@@ -453,14 +453,29 @@ def _is_near(
     return excess(one) <= WITHIN_REACH * min(known, default=0.0)
 
 
-def _decided(
+def decided_by_runs(
     findings: Findings,
     tried: Mapping[tuple[str, ...], Turn],
     fits: Mapping[tuple[str, ...], CandidateFit],
 ) -> tuple[Findings, dict[str, float]] | None:
-    """The verdict by runs of the simulation, if one of its effects may be named."""
+    """The verdict by runs of the simulation, if effects of one of them may be named.
+
+    Parameters
+    ----------
+    tried : mapping of tuple of str to Turn
+        Best run with each effect, or set of effects.
+    fits : mapping of tuple of str to CandidateFit
+        What these runs left, and what the stand-in leaves with parts of the sets.
+
+    Returns
+    -------
+    Findings
+        With that verdict.
+    dict of str to float
+        Parameters of the simulation at that run.
+    """
     criteria, base = findings.criteria, findings.base
-    best = select_best(criteria, list(fits.values()), base)
+    best = select_best(criteria, [fits[one] for one in tried], base)
     if best is None:
         return None
 
@@ -469,7 +484,7 @@ def _decided(
         return unclear_effects(problem, one, findings.scales)
 
     verdict = decide(criteria, findings.given_sse, base, fits, (best,), unclear)
-    if not verdict.chosen.effects:
+    if verdict.chosen.effects not in tried:
         return None
     turn = tried[verdict.chosen.effects]
     found = replace(findings.found, fits={**findings.found.fits, **fits})

@@ -620,6 +620,7 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
     monkeypatch.setattr(
         foreign, "confirm", lambda found, *_: (found, {"c": 1.0}, False)
     )
+    monkeypatch.setattr(foreign, "leads_in_simulation", lambda *_: alone)
     simulator = SimpleNamespace(run=simulate)
     runs = Runs(simulator, CountedRuns(None))
     foreign._found(
@@ -627,6 +628,65 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
         lambda *_: None, None, is_first=False,
     )  # fmt: skip
     assert asked == [(1, False), (3, not is_borne_out)]
+
+
+@pytest.mark.parametrize(
+    ("effects", "is_confirmed", "is_found", "told"),
+    [
+        # A set that the simulation's run bears out needs no other one ...
+        (("end_stop", "gravity"), True, True, "set"),
+        # ... and where it bears none out, or none was named, its runs choose another ...
+        (("end_stop", "gravity"), False, True, "lead"),
+        ((), True, True, "lead"),
+        # ... if they can.
+        ((), True, False, "set"),
+    ],
+)
+def test_other_sets_are_run_where_none_is_confirmed(
+    monkeypatch, effects, is_confirmed, is_found, told
+):
+    def findings(name, effects):
+        verdict = SimpleNamespace(word=name, chosen=made_up(effects, 100.0))
+        return SimpleNamespace(verdict=verdict)
+
+    several, lead = findings("set", effects), findings("lead", ("end_stop", "hum"))
+    leads = ToldByRuns(lead if is_found else None, {"c": 2.0}, is_all=False)
+    monkeypatch.setattr(foreign, "find", lambda *_, **__: several)
+    monkeypatch.setattr(foreign, "confirm", lambda *_: (several, {}, is_confirmed))
+    monkeypatch.setattr(foreign, "leads_in_simulation", lambda *_: leads)
+    runs = SimpleNamespace(run_tasks=None)
+    alone = ToldByRuns(None, {}, is_all=False)
+    found, values, borne_out = foreign._of_sets(
+        None, DiagnoseOptions(), (runs, {}), lambda *_: None, None, alone
+    )
+    assert found.verdict.word == told
+    assert values == ({"c": 2.0} if told == "lead" else {})
+    assert borne_out is (told == "lead" or is_confirmed)
+
+
+@pytest.mark.parametrize(("given", "most"), [(None, 1.5), (800, 1.0)])
+def test_sets_have_runs_beyond_those_of_single_effects_where_these_are_open(
+    monkeypatch, given, most
+):
+    seen = []
+    verdict = SimpleNamespace(word="unknown", chosen=made_up((), 100.0))
+    found = SimpleNamespace(verdict=verdict)
+    alone = ToldByRuns(None, {}, is_all=False)
+    monkeypatch.setattr(foreign, "find", lambda *_, **__: found)
+    monkeypatch.setattr(foreign, "with_further_effect", lambda first, *_: first)
+    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_: alone)
+    monkeypatch.setattr(foreign, "_with_runs", lambda one, *_: one)
+    monkeypatch.setattr(foreign, "_of_sets", lambda *a: seen.append(a[2][0]))
+    # All that may be left out are spent.
+    counted = CountedRuns(lambda *_, **__: [], 800)
+    counted.count = 900
+    runs = Runs(SimpleNamespace(run=simulate), counted)
+    foreign._found(
+        None, DiagnoseOptions(max_runs=given), (runs, {}), lambda *_: None, None,
+        is_first=False,
+    )  # fmt: skip
+    assert len(seen) == (most > 1.0)
+    assert all(not one.run_tasks.are_spent for one in seen)
 
 
 @pytest.mark.thorough

@@ -309,3 +309,14 @@ def test_the_richer_law_follows_where_the_plain_one_leaves_too_much(monkeypatch)
     sses["sensor_lag"] = 100.0
     found = tried_at_ports(monkeypatch, lefts, sses, shares=("sensor_lag", richer))
     assert found == (["sensor_lag"], [])
+
+
+def test_what_the_simulation_was_not_run_with_is_not_told(monkeypatch):
+    # A part of a set stands among what is weighed as the stand-in leaves it.
+    run, part = made_up(("end_stop", "gravity"), 300.0), made_up(("end_stop",), 500.0)
+    verdict = SimpleNamespace(chosen=part)
+    monkeypatch.setattr(single_effects, "decide", lambda *_: verdict)
+    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0), given_sse=None)
+    fits = {one.effects: one for one in (part, run)}
+    turns = {run.effects: SimpleNamespace()}
+    assert single_effects.decided_by_runs(findings, turns, fits) is None
