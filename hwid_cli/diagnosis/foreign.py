@@ -98,10 +98,24 @@ def diagnose_foreign(
             runs, begun.problem, found.verdict, refitted, options, on_round
         )
         found, values = law or (found, values)
+    said = _said_of_runs(counted, found)
     told = _told(found, begun, (refitted, values))
+    told = replace(told, warnings=(*told.warnings, *said))
     if not search.is_confirmed:
         return replace(told, confirmed="surrogate")
     return _confirmed(told, found, (runs, values), on_round)
+
+
+def _said_of_runs(counted: CountedRuns, found: Findings) -> tuple[str, ...]:
+    """Say that the limit of runs has ended the search, where something is left."""
+    is_done = found.verdict.is_complete or _is_all_but_nothing(found)
+    if is_done or not counted.are_spent:
+        return ()
+    return (
+        f"the search ended after {counted.count} runs of the simulation, before every "
+        "likely effect was run in it: more may be found with a larger limit, as in "
+        f"'diagnose: {{max_runs: {2 * counted.count}}}'; finished runs come from the cache",
+    )
 
 
 @dataclass(frozen=True, eq=False)

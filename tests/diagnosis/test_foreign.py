@@ -37,7 +37,7 @@ from tests.black_boxes.plants import (
     integrate,
 )
 from tests.black_boxes.run_boxes import diagnose, runs_of, write_case
-from tests.diagnosis.made_up_fits import CRITERIA, made_up
+from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 from tests.report.diagnosis_examples import named
 
 STEP_S, N = 1e-3, 500
@@ -662,6 +662,28 @@ def test_other_sets_are_run_where_none_is_confirmed(
     assert found.verdict.word == told
     assert values == ({"c": 2.0} if told == "lead" else {})
     assert borne_out is (told == "lead" or is_confirmed)
+
+
+@pytest.mark.parametrize(
+    ("count", "is_complete", "left", "is_said"),
+    [
+        (900, False, 400.0, True),
+        # Runs are left, nothing is, or next to nothing.
+        (700, False, 400.0, False),
+        (900, True, 400.0, False),
+        (900, False, 100.5, False),
+    ],
+)
+def test_a_search_that_its_runs_have_ended_says_so(count, is_complete, left, is_said):
+    counted = CountedRuns(None, 800)
+    counted.count = count
+    chosen = made_up(("end_stop",), left)
+    verdict = SimpleNamespace(is_complete=is_complete, chosen=chosen)
+    found = SimpleNamespace(verdict=verdict, base=base(2000.0), criteria=CRITERIA)
+    said = foreign._said_of_runs(counted, found)
+    assert [("900 runs" in one, "max_runs: 1800" in one) for one in said] == (
+        [(True, True)] if is_said else []
+    )
 
 
 @pytest.mark.parametrize(("given", "most"), [(None, 1.5), (800, 1.0)])
