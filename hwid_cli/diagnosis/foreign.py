@@ -98,9 +98,9 @@ def diagnose_foreign(
             runs, begun.problem, found.verdict, refitted, options, on_round
         )
         found, values = law or (found, values)
-    said = _said_of_runs(counted, found)
     told = _told(found, begun, (refitted, values))
-    told = replace(told, warnings=(*told.warnings, *said))
+    if said := _said_of_runs(counted, found):
+        told = replace(told, warnings=(*told.warnings, *said))
     if not search.is_confirmed:
         return replace(told, confirmed="surrogate")
     return _confirmed(told, found, (runs, values), on_round)
@@ -108,8 +108,9 @@ def diagnose_foreign(
 
 def _said_of_runs(counted: CountedRuns, found: Findings) -> tuple[str, ...]:
     """Say that the limit of runs has ended the search, where something is left."""
-    is_done = found.verdict.is_complete or _is_all_but_nothing(found)
-    if is_done or not counted.are_spent:
+    if not counted.are_spent:
+        return ()
+    if found.verdict.is_complete or _is_all_but_nothing(found):
         return ()
     return (
         f"the search ended after {counted.count} runs of the simulation, before every "
