@@ -113,9 +113,10 @@ def _said_of_runs(counted: CountedRuns, found: Findings) -> tuple[str, ...]:
     if found.verdict.is_complete or _is_all_but_nothing(found):
         return ()
     return (
-        f"the search ended after {counted.count} runs of the simulation, before every "
-        "likely effect was run in it: more may be found with a larger limit, as in "
-        f"'diagnose: {{max_runs: {2 * counted.count}}}'; finished runs come from the cache",
+        f"the search reached its limit of runs (diagnose.max_runs) after {counted.count} "
+        "runs of the simulation, and may have left out likely effects: a larger limit, as "
+        f"in 'diagnose: {{max_runs: {2 * counted.count}}}', takes finished runs from the "
+        "cache",
     )
 
 
@@ -288,8 +289,7 @@ def _of_sets(
     several = confirm(found, runs, values)
     if alone is None:
         return several
-    told, moved, is_confirmed = several
-    if not (is_confirmed and told.verdict.chosen.effects):
+    if not _is_borne_out(several):
         leads = leads_in_simulation(found, runs, values, on_round)
         if leads.findings is not None:
             several = leads.findings, leads.values, True
@@ -317,13 +317,17 @@ def _with_runs(found: Findings, alone: ToldByRuns) -> Findings:
     return replace(found, found=replace(found.found, fits=fits))
 
 
+def _is_borne_out(several: tuple[Findings, dict[str, float], bool]) -> bool:
+    """Whether there are effects that the simulation's own run confirms."""
+    told, _, is_confirmed = several
+    return is_confirmed and bool(told.verdict.chosen.effects)
+
+
 def _leaves_less(
     several: tuple[Findings, dict[str, float], bool], one: Findings
 ) -> bool:
     """Whether the simulation's run with a set leaves less than that with one effect."""
-    told, _, is_confirmed = several
-    has_effects = bool(told.verdict.chosen.effects)
-    return is_confirmed and has_effects and _leaves_less_than(told, one)
+    return _is_borne_out(several) and _leaves_less_than(several[0], one)
 
 
 def _leaves_less_than(one: Findings, other: Findings) -> bool:
