@@ -12,6 +12,7 @@ from hwid_cli.drive.motion.forces import (
     acceleration,
     drive_now,
     is_force_curved,
+    moved_mass,
     net_forces,
     own_force,
     resisting,
@@ -50,7 +51,12 @@ from hwid_cli.drive.motion.state import (
     V,
     X,
 )
-from hwid_cli.drive.motion.winding import is_wound, rate_of_winding, step_wound
+from hwid_cli.drive.motion.winding import (
+    is_wound,
+    rate_of_winding,
+    slow_pace,
+    step_wound,
+)
 
 # Beyond this many Stribeck velocities the excess is below rounding, exp(-6.1^2); and
 # beyond this many yield lengths the hysteresis has yielded, exp(-37).
@@ -183,7 +189,12 @@ def _rate_of_contact(
 
 @compiled(**INNER)
 def step_limit(
-    state: np.ndarray, memory: np.ndarray, push: np.ndarray, done: float, p: np.ndarray
+    state: np.ndarray,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    is_exponential: bool,
+    p: np.ndarray,
 ) -> float:
     """Return the longest step in which no curved force turns too far.
 
@@ -194,24 +205,27 @@ def step_limit(
     push : ndarray, shape (N_PUSH,)
     done : float, [s]
         Since the start of the piece.
+    is_exponential : bool
+        Whether the step follows motor, appendage and circuit exactly, however fast.
     p : ndarray, shape (N_SLOTS,)
     """
-    mass = p[slots.MASS]
-    has_motor = p[slots.GEAR_STIFFNESS] > 0.0
-    if has_motor:
-        mass *= min(p[slots.MOTOR_SHARE], 1.0 - p[slots.MOTOR_SHARE])
+    mass = moved_mass(p)
     x, v = state[X], state[V]
     speed = abs(v)
     low, high = _places_ahead(state, memory, push, done, p)
     stiffness = spring_rate(x, low, high, p)
     damping = p[slots.DAMPING] + 2.0 * abs(p[slots.DRAG]) * speed
-    if has_motor and abs(state[2] - x) > p[slots.GEAR_GAP]:
-        stiffness += p[slots.GEAR_STIFFNESS]
-        damping += p[slots.GEAR_DAMPING]
-    if p[slots.CLIP_LIMIT] < np.inf:
-        damping += p[slots.FORCE_CONSTANT] * p[slots.CLIP_SLOPE]
-    if p[slots.RESISTANCE] > 0.0:
-        damping += p[slots.FORCE_CONSTANT] * p[slots.BACK_EMF] / p[slots.RESISTANCE]
+    if not is_exponential:
+        if p[slots.GEAR_STIFFNESS] > 0.0:
+            mass = min(mass, p[slots.MASS] - mass)
+            if abs(state[MOTOR_X] - x) > p[slots.GEAR_GAP]:
+                stiffness += p[slots.GEAR_STIFFNESS]
+                damping += p[slots.GEAR_DAMPING]
+        if p[slots.CLIP_LIMIT] < np.inf:
+            damping += p[slots.FORCE_CONSTANT] * p[slots.CLIP_SLOPE]
+        if p[slots.RESISTANCE] > 0.0:
+            resistance = p[slots.RESISTANCE]
+            damping += p[slots.FORCE_CONSTANT] * p[slots.BACK_EMF] / resistance
     if p[slots.COGGING_FORCE] != 0.0:
         turn = TURN / p[slots.COGGING_PERIOD]
         stiffness += abs(p[slots.COGGING_FORCE]) * turn
@@ -233,14 +247,11 @@ def step_limit(
             rate += fast
     if p[slots.HAS_CONTACT] != 0.0:
         rate += _contact_rate(x, low, high, v, mass, p)
-    if p[slots.MODE_MASS] > 0.0:
-        both = 1.0 / p[slots.MODE_MASS] + 1.0 / mass
-        rate += np.sqrt(p[slots.MODE_STIFFNESS] * both) + p[slots.MODE_DAMPING] * both
-    if p[slots.INDUCTANCE] > 0.0:
-        fast = p[slots.RESISTANCE] / p[slots.INDUCTANCE]
-        if is_wound(p):
-            fast = rate_of_winding(fast, state, memory, push, done, p)
-        rate += fast
+    if not is_exponential:
+        rate += _rate_of_inner(state, memory, push, done, mass, p)
+    elif p[slots.INDUCTANCE] > 0.0:
+        # What a coil lets through within a sample changes the motion within it.
+        rate += slow_pace(p[slots.RESISTANCE] / p[slots.INDUCTANCE], LONGEST_PHASE, p)
     if p[slots.HYSTERESIS_FORCE] != 0.0:
         rate += _rate_of_yielding(state, memory, mass, p)
     if p[slots.OWN_FORCE] != 0.0:
@@ -255,6 +266,28 @@ def step_limit(
             pull = abs(acceleration(state, memory, push, done, p)[0])
             rate += abs(p[slots.STATIC_EXCESS]) / (mass * slow) + 0.5 * pull / slow
     return LONGEST_PHASE / max(rate, 1e-9)
+
+
+@compiled(**INNER)
+def _rate_of_inner(
+    state: np.ndarray,
+    memory: np.ndarray,
+    push: np.ndarray,
+    done: float,
+    mass: float,
+    p: np.ndarray,
+) -> float:
+    """Return how fast an appendage and a circuit turn."""
+    rate = 0.0
+    if p[slots.MODE_MASS] > 0.0:
+        both = 1.0 / p[slots.MODE_MASS] + 1.0 / mass
+        rate += np.sqrt(p[slots.MODE_STIFFNESS] * both) + p[slots.MODE_DAMPING] * both
+    if p[slots.INDUCTANCE] > 0.0:
+        fast = p[slots.RESISTANCE] / p[slots.INDUCTANCE]
+        if is_wound(p):
+            fast = rate_of_winding(fast, state, memory, push, done, p)
+        rate += fast
+    return rate
 
 
 @compiled(**INNER)

@@ -28,6 +28,8 @@ from hwid_cli.drive.motion.events import (
     stop,
     time_of,
 )
+from hwid_cli.drive.motion.excursions import LONGEST_PHASE
+from hwid_cli.drive.motion.exponential import is_exponential
 from hwid_cli.drive.motion.forces import drawn_current, has_dry_friction
 from hwid_cli.drive.motion.hysteresis import bristle_level, remember
 from hwid_cli.drive.motion.linear import N_COLUMNS, N_INPUT, active_states, fastest
@@ -59,9 +61,8 @@ from hwid_cli.drive.motion.state import (
 )
 from hwid_cli.drive.motion.winding import is_wound, slow_pace
 
-# Where events are watched, a step turns nothing by more than this, [rad]: a longer one
-# could go there and back.
-LONGEST_PHASE = 0.5
+# Halvings of a sample for exponential steps.
+HALVINGS = 6
 # Pieces that are listed at once.
 MANY_PIECES = 1000
 # Most events in one piece; what rattles more often is followed less exactly.
@@ -95,7 +96,7 @@ def move(
     trial, inputs, active = state.copy(), np.zeros(N_INPUT), active_states(p)
     kind = _kind_of(p)
     step = _longest_step(sample_time, kind, p)
-    matrices, lengths = _make_room(sample_time, step, p)
+    matrices, lengths = _make_room(sample_time, step, kind, p)
     # Pieces are listed for many samples at once, or for one after the other where the
     # command or the temperature depends on the motion.
     is_single = has_controller or (
@@ -187,7 +188,7 @@ def _longest_step(
     p: np.ndarray,
 ) -> float:
     """Return the longest step of linear motion, a whole part of a sample."""
-    _, has_edges, _, is_watched, _, rate = kind
+    has_inner, has_edges, is_curved, is_watched, is_curved_at_times, rate = kind
     count = 1.0
     if has_edges or is_watched:
         if is_wound(p):
@@ -196,19 +197,41 @@ def _longest_step(
             rate += slow_pace(fast, LONGEST_PHASE, p) - fast
         count = np.ceil(sample_time * rate / LONGEST_PHASE)
         count = min(max(count, 1.0), MOST_STEPS)
+        if has_inner and (is_curved or is_curved_at_times):
+            # Exponential steps are halves of halves of a sample.
+            halves = 1.0
+            while halves < count:
+                halves *= 2.0
+            count = halves
     return sample_time / count
 
 
 @compiled(**MAKING)
 def _make_room(
-    sample_time: float, step: float, p: np.ndarray
+    sample_time: float,
+    step: float,
+    kind: tuple[bool, bool, bool, bool, bool, float],
+    p: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return room for matrices, and the lengths that they are for."""
     # Lengths that come back in every sample: whole steps, and both parts that a delay
     # makes of a sample.
     whole = np.floor(p[slots.DELAY] / sample_time) * sample_time
     part = p[slots.DELAY] - whole
-    lengths = np.array([step, part, sample_time - part])
+    halvings = 0
+    if kind[0] and (kind[2] or kind[4]) and is_exponential(p):
+        halvings = HALVINGS
+    n_parts = 3 if part > 0.0 else 1
+    parts = (sample_time, part, sample_time - part)
+    lengths = np.empty(1 + n_parts * (1 + halvings))
+    lengths[0] = step
+    count = 1
+    for n in range(n_parts):
+        length = parts[n]
+        for _ in range(1 + halvings):
+            lengths[count] = length
+            length *= 0.5
+            count += 1
     n_matrices = lengths.size * 2 * 3 ** count_edges(p)
     return np.zeros((n_matrices, N_STATE, N_COLUMNS)), lengths
 
@@ -361,7 +384,7 @@ def _move_piece(
                 is_held = False
                 events += 1
         if (is_curved or is_curved_at_times) and not (is_held and stays(p)):
-            limit = step_limit(state, memory, push, done, p)
+            limit = step_limit(state, memory, push, done, False, p)
             limit = max(limit, length / MOST_STEPS)
             if limit < h:
                 h = left / np.ceil(left / limit)

@@ -11,12 +11,13 @@ from hwid_cli.drive import slots
 from hwid_cli.drive.motion.corners import corner_of
 from hwid_cli.drive.motion.curved import is_curved_here, step_limit, step_plain
 from hwid_cli.drive.motion.events import (
-    ON_EDGE,
     STILL_FAST,
     excess,
     set_inputs,
     steady_force,
 )
+from hwid_cli.drive.motion.excursions import bounds, is_slow, stays_between
+from hwid_cli.drive.motion.exponential import is_exponential, step_exponential
 from hwid_cli.drive.motion.forces import speed_of_excess
 from hwid_cli.drive.motion.hysteresis import remember
 from hwid_cli.drive.motion.linear import (
@@ -36,48 +37,6 @@ from hwid_cli.drive.motion.state import WAY, V, X
 FAR_FROM_LIMIT = 4
 # Most steps in one piece; what is faster than that is followed less exactly.
 MOST_STEPS = 400
-
-
-@compiled(**INNER)
-def bounds(x: float, p: np.ndarray) -> tuple[float, float]:
-    """Return between which edges of gaps and stops a position is.
-
-    Parameters
-    ----------
-    x : float, [m]
-    p : ndarray, shape (N_SLOTS,)
-    """
-    low, high = -np.inf, np.inf
-    for n in range(5):
-        edge = np.inf
-        if n < 2 and p[slots.SPRING_GAP] > 0.0:
-            edge = p[slots.SPRING_GAP]
-        if 2 <= n < 4 and p[slots.STOP_STIFFNESS] > 0.0:
-            edge = p[slots.STOP_POSITION]
-        if n == 4 and p[slots.SIDE_STIFFNESS] > 0.0:
-            edge = p[slots.SIDE_POSITION]
-        if edge == np.inf:
-            continue
-        if n % 2 == 1:
-            edge = -edge
-        # On the edge itself the drive is not beyond it.
-        if x > edge or (x == edge and edge < 0.0):
-            low = max(low, edge)
-        else:
-            high = min(high, edge)
-    if p[slots.SECOND_STIFFNESS] > 0.0:
-        edge = p[slots.SECOND_POSITION]
-        if x > edge or (x == edge and edge < 0.0):
-            low = max(low, edge)
-        else:
-            high = min(high, edge)
-    if p[slots.HAS_ZERO_EDGE] != 0.0:
-        # At 0 itself the drive is on neither side.
-        if x > 0.0:
-            low = max(low, ON_EDGE)
-        elif x < 0.0:
-            high = min(high, -ON_EDGE)
-    return low, high
 
 
 @compiled(**INNER)
@@ -176,7 +135,7 @@ def glide_plain(
             if is_curved:
                 if j >= trusted:
                     state[X], state[V] = x, v
-                    limit = step_limit(state, memory, push, done, p)
+                    limit = step_limit(state, memory, push, done, False, p)
                     limit = max(limit, length / MOST_STEPS)
                     if limit < left:
                         h = left / np.ceil(left / limit)
@@ -256,29 +215,65 @@ def glide_inner(
     float, [s]
         How far into the piece.
     """
-    _, has_edges, is_curved, is_watched, is_curved_at_times, rate = kind
-    if is_curved or is_curved_at_times:
+    _, has_edges, is_always_curved, is_watched, is_curved_at_times, rate = kind
+    may_be_curved = is_always_curved or is_curved_at_times
+    if may_be_curved and not is_exponential(p):
         return 0.0
     is_held = is_watched and memory[WAY] == 0.0
     if is_held and excess(state, memory, push, 0.0, p)[1] > 0.0:
         return 0.0
     corner = corner_of(state, push[DRIVE], p)
+    slow = 0.0
+    if p[slots.STATIC_EXCESS] != 0.0:
+        slow = speed_of_excess(STILL_FAST, p)
     done = 0.0
+    # Nothing may happen within a step; most pieces are far from where it could.
+    is_short = is_held or not is_slow(length, corner, p)
     while done < length:
-        h = left = length - done
-        if h > step * (1.0 + 1e-9) or abs(h - step) < 1e-9 * step:
+        left = length - done
+        is_curved = is_always_curved and not is_held
+        if is_curved_at_times and not (is_curved or is_held):
+            is_curved = is_curved_here(state, memory, p)
+        h = left
+        if (is_short or done > 0.0) and h > step * (1.0 - 1e-9):
             h = step
-        set_inputs(inputs, memory, push, done, p)
+        if is_curved:
+            limit = step_limit(state, memory, push, done, True, p)
+            if is_short:
+                limit = min(limit, step * (1.0 + 1e-9))
+            h = length
+            while h > limit or h > left * (1.0 + 1e-9):
+                h *= 0.5
         m = which_matrix(h, lengths, corner[0], is_held)
-        if m < 0:
-            sum_series(state, trial, inputs, h, corner, is_held, rate, p)
-        else:
+        if is_curved:
+            half = which_matrix(0.5 * h, lengths, corner[0], is_held)
+            if m < 0 or half < 0:
+                return done
             fill(matrices, m, h, corner, is_held, rate, p)
-            apply(matrices, m, state, inputs, trial, active)
+            fill(matrices, half, 0.5 * h, corner, is_held, rate, p)
+            step_exponential(
+                state, trial, memory, push, done, h, corner, (m, half), matrices,
+                inputs, active, p,
+            )  # fmt: skip
+        else:
+            set_inputs(inputs, memory, push, done, p)
+            if m < 0:
+                sum_series(state, trial, inputs, h, corner, is_held, rate, p)
+            else:
+                fill(matrices, m, h, corner, is_held, rate, p)
+                apply(matrices, m, state, inputs, trial, active)
+        is_long = h > step * (1.0 + 1e-9) and (has_edges or is_watched)
+        if is_long and not stays_between(
+            state, trial, memory, push, done, h, is_watched, p
+        ):
+            is_short = True
+            continue
         if is_held:
             if excess(trial, memory, push, done + h, p)[1] > 0.0:
                 return done
         elif is_watched and memory[WAY] * trial[V] < 0.0:
+            return done
+        if slow > 0.0 and not (is_curved or is_held) and memory[WAY] * trial[V] < slow:
             return done
         if has_edges:
             there = corner_of(trial, value_of(push, DRIVE, done + h), p)
@@ -286,5 +281,7 @@ def glide_inner(
                 return done
         for n in range(active.size):
             state[active[n]] = trial[active[n]]
+        if p[slots.HAS_SHAPE] != 0.0 and not is_held:
+            remember(state[X], state[V], memory, p)
         done = length if h >= left * (1.0 - 1e-12) else done + h
     return length

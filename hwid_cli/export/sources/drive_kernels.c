@@ -221,11 +221,15 @@ enum {
     LEAVING = 0,
     REVERSAL = 1,
     EDGE = 2,
+    _CONSTANT = 8,
+    _SLOPE = 13,
+    _BEND = 14,
     LENGTH = 0,
     SAMPLE = 1,
     FAR_FROM_LIMIT = 4,
     MOST_STEPS = 400,
     N_PIECE = 2,
+    HALVINGS = 6,
     MANY_PIECES = 1000,
     MOST_EVENTS = 100
 };
@@ -2427,6 +2431,26 @@ static tuple_dd drive_further_stiffness(double *state, double *push, double done
     return (tuple_dd){stiffness, waves};
 }
 
+static double drive_rate_of_inner(double *state, double *memory, double *push, double done, double mass, double *p)
+{
+    double rate = 0.0;
+    double both = 0.0;
+    double fast = 0.0;
+    rate = 0.0;
+    if (p[MODE_MASS] > 0.0) {
+        both = (1.0 / p[MODE_MASS]) + (1.0 / mass);
+        rate += sqrt(p[MODE_STIFFNESS] * both) + (p[MODE_DAMPING] * both);
+    }
+    if (p[INDUCTANCE] > 0.0) {
+        fast = p[RESISTANCE] / p[INDUCTANCE];
+        if (drive_is_wound(p)) {
+            fast = drive_rate_of_winding(fast, state, memory, push, done, p);
+        }
+        rate += fast;
+    }
+    return rate;
+}
+
 static double drive_rate_of_bending(double *state, double *memory, double mass, double *p)
 {
     double v = 0.0;
@@ -2568,10 +2592,9 @@ static double drive_rate_of_own(double *state, double *memory, double *push, dou
     return rate;
 }
 
-static double drive_step_limit(double *state, double *memory, double *push, double done, double *p)
+static double drive_step_limit(double *state, double *memory, double *push, double done, int is_exponential, double *p)
 {
     double mass = 0.0;
-    int has_motor = 0;
     double x = 0.0;
     double v = 0.0;
     double speed = 0.0;
@@ -2580,6 +2603,7 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     double high = 0.0;
     double stiffness = 0.0;
     double damping = 0.0;
+    double resistance = 0.0;
     double turn = 0.0;
     double turning = 0.0;
     tuple_dd t2 = {0};
@@ -2588,13 +2612,8 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     double pull = 0.0;
     double ahead = 0.0;
     double fast = 0.0;
-    double both = 0.0;
     double slow = 0.0;
-    mass = p[MASS];
-    has_motor = p[GEAR_STIFFNESS] > 0.0;
-    if (has_motor) {
-        mass *= least(p[MOTOR_SHARE], 1.0 - p[MOTOR_SHARE]);
-    }
+    mass = drive_moved_mass(p);
     x = state[X];
     v = state[V];
     speed = fabs(v);
@@ -2603,15 +2622,21 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     high = t1.m1;
     stiffness = drive_spring_rate(x, low, high, p);
     damping = p[DAMPING] + ((2.0 * fabs(p[DRAG])) * speed);
-    if (has_motor && (fabs(state[2] - x) > p[GEAR_GAP])) {
-        stiffness += p[GEAR_STIFFNESS];
-        damping += p[GEAR_DAMPING];
-    }
-    if (p[CLIP_LIMIT] < HUGE_VAL) {
-        damping += p[FORCE_CONSTANT] * p[CLIP_SLOPE];
-    }
-    if (p[RESISTANCE] > 0.0) {
-        damping += (p[FORCE_CONSTANT] * p[BACK_EMF]) / p[RESISTANCE];
+    if (!is_exponential) {
+        if (p[GEAR_STIFFNESS] > 0.0) {
+            mass = least(mass, p[MASS] - mass);
+            if (fabs(state[MOTOR_X] - x) > p[GEAR_GAP]) {
+                stiffness += p[GEAR_STIFFNESS];
+                damping += p[GEAR_DAMPING];
+            }
+        }
+        if (p[CLIP_LIMIT] < HUGE_VAL) {
+            damping += p[FORCE_CONSTANT] * p[CLIP_SLOPE];
+        }
+        if (p[RESISTANCE] > 0.0) {
+            resistance = p[RESISTANCE];
+            damping += (p[FORCE_CONSTANT] * p[BACK_EMF]) / resistance;
+        }
     }
     if (p[COGGING_FORCE] != 0.0) {
         turn = 6.283185307179586 / p[COGGING_PERIOD];
@@ -2638,16 +2663,12 @@ static double drive_step_limit(double *state, double *memory, double *push, doub
     if (p[HAS_CONTACT] != 0.0) {
         rate += drive_contact_rate(x, low, high, v, mass, p);
     }
-    if (p[MODE_MASS] > 0.0) {
-        both = (1.0 / p[MODE_MASS]) + (1.0 / mass);
-        rate += sqrt(p[MODE_STIFFNESS] * both) + (p[MODE_DAMPING] * both);
-    }
-    if (p[INDUCTANCE] > 0.0) {
-        fast = p[RESISTANCE] / p[INDUCTANCE];
-        if (drive_is_wound(p)) {
-            fast = drive_rate_of_winding(fast, state, memory, push, done, p);
+    if (!is_exponential) {
+        rate += drive_rate_of_inner(state, memory, push, done, mass, p);
+    } else {
+        if (p[INDUCTANCE] > 0.0) {
+            rate += drive_slow_pace(p[RESISTANCE] / p[INDUCTANCE], 0.3, p);
         }
-        rate += fast;
     }
     if (p[HYSTERESIS_FORCE] != 0.0) {
         rate += drive_rate_of_yielding(state, memory, mass, p);
@@ -3511,57 +3532,6 @@ static double drive_time_of(int event, double *state, double *trial, double *mem
     return time;
 }
 
-static tuple_dd drive_bounds(double x, double *p)
-{
-    double low = 0.0;
-    double high = 0.0;
-    int n = 0;
-    double edge = 0.0;
-    low = -HUGE_VAL;
-    high = HUGE_VAL;
-    for (n = 0; n < 5; ++n) {
-        edge = HUGE_VAL;
-        if ((n < 2) && (p[SPRING_GAP] > 0.0)) {
-            edge = p[SPRING_GAP];
-        }
-        if (((2 <= n) && (n < 4)) && (p[STOP_STIFFNESS] > 0.0)) {
-            edge = p[STOP_POSITION];
-        }
-        if ((n == 4) && (p[SIDE_STIFFNESS] > 0.0)) {
-            edge = p[SIDE_POSITION];
-        }
-        if (edge == HUGE_VAL) {
-            continue;
-        }
-        if ((n % 2) == 1) {
-            edge = -edge;
-        }
-        if ((x > edge) || ((x == edge) && (edge < 0.0))) {
-            low = most(low, edge);
-        } else {
-            high = least(high, edge);
-        }
-    }
-    if (p[SECOND_STIFFNESS] > 0.0) {
-        edge = p[SECOND_POSITION];
-        if ((x > edge) || ((x == edge) && (edge < 0.0))) {
-            low = most(low, edge);
-        } else {
-            high = least(high, edge);
-        }
-    }
-    if (p[HAS_ZERO_EDGE] != 0.0) {
-        if (x > 0.0) {
-            low = most(low, 1e-200);
-        } else {
-            if (x < 0.0) {
-                high = least(high, -1e-200);
-            }
-        }
-    }
-    return (tuple_dd){low, high};
-}
-
 static tuple_iiiiid drive_kind_of(double *p)
 {
     int has_inner = 0;
@@ -3577,14 +3547,21 @@ static tuple_iiiiid drive_kind_of(double *p)
 static double drive_longest_step(double sample_time, tuple_iiiiid kind, double *p)
 {
     tuple_iiiiid t1 = {0};
+    int has_inner = 0;
     int has_edges = 0;
+    int is_curved = 0;
     int is_watched = 0;
+    int is_curved_at_times = 0;
     double rate = 0.0;
     double count = 0.0;
     double fast = 0.0;
+    double halves = 0.0;
     t1 = kind;
+    has_inner = t1.m0;
     has_edges = t1.m1;
+    is_curved = t1.m2;
     is_watched = t1.m3;
+    is_curved_at_times = t1.m4;
     rate = t1.m5;
     count = 1.0;
     if (has_edges || is_watched) {
@@ -3594,6 +3571,13 @@ static double drive_longest_step(double sample_time, tuple_iiiiid kind, double *
         }
         count = ceil((sample_time * rate) / 0.5);
         count = least(most(count, 1.0), MOST_STEPS);
+        if (has_inner && (is_curved || is_curved_at_times)) {
+            halves = 1.0;
+            while (halves < count) {
+                halves *= 2.0;
+            }
+            count = halves;
+        }
     }
     return sample_time / count;
 }
@@ -3776,7 +3760,7 @@ static void drive_move_piece(double *state, double *trial, double *memory, doubl
             }
         }
         if ((is_curved || is_curved_at_times) && (!(is_held && drive_stays(p)))) {
-            limit = drive_step_limit(state, memory, push, done, p);
+            limit = drive_step_limit(state, memory, push, done, 0, p);
             limit = most(limit, length / MOST_STEPS);
             if (limit < h) {
                 h = left / ceil(left / limit);
