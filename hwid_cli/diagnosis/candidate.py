@@ -8,7 +8,7 @@ Below it, what a fit stands for: its drive, its effects, its point of a search.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -79,12 +79,33 @@ class Baseline:
     given : Drive or None
         With the base as given. Where the re-fit has bent it to imitate what is
         missing, that is the better start.
+    resonances : mapping of str to tuple of SearchStart
+        Where spectra say that effects which resonate begin, by their ids.
     """
 
     drive: Drive
     scales: Scales
     noise: NoiseFloor
     given: Drive | None = None
+    resonances: Mapping[str, tuple["SearchStart", ...]] = field(default_factory=dict)
+
+    def with_resonances(
+        self, effects: tuple[str, ...], starts: Sequence["SearchStart"]
+    ) -> list["SearchStart"]:
+        """Add starts of a set, each with one resonance as spectra show it.
+
+        All else is as in the first start.
+        """
+        seen = [
+            replace(
+                starts[0],
+                base={**starts[0].base, **one.base},
+                effects={**starts[0].effects, **one.effects},
+            )
+            for effect in effects
+            for one in self.resonances.get(effect, ())
+        ]
+        return [*starts, *seen]
 
     @property
     def is_bent(self) -> bool:

@@ -69,6 +69,7 @@ from hwid_cli.diagnosis.problem import (
     prepare,
 )
 from hwid_cli.diagnosis.residual_noise import residual_noise
+from hwid_cli.diagnosis.resonances import resonances
 from hwid_cli.diagnosis.rounds import RoundsResult, continue_rounds, run_rounds
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED_SET,
@@ -508,12 +509,18 @@ def _beside(
     force = latent_force(before, drive, noise)
     if given_sse is None:
         given_sse = each_sum_of_squares([one.left for one in fitted.given])
+    allowed = allowed_effects(problem, options)
+    baseline = Baseline(drive, fitted.scales, noise, problem.drive)
+    criteria = SelectionCriteria.of(problem, noise)
+    if base.is_usable and not criteria.needs_nothing(base):
+        seen = resonances(problem, drive, allowed, fitted.scales, run_tasks)
+        baseline = replace(baseline, resonances=seen)
     rounds = Rounds(
         problem,
-        Baseline(drive, fitted.scales, noise, problem.drive),
-        SelectionCriteria.of(problem, noise),
+        baseline,
+        criteria,
         base,
-        allowed_effects(problem, options),
+        allowed,
         run_tasks,
         on_round,
     )

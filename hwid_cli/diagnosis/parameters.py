@@ -250,11 +250,29 @@ def _base_unknowns(
             low, high = _near(drive, name, value)
         elif name == "damping_N_s_per_m" and value > 0:
             high = max(min(high, fastest), size)
+        elif name == "force_constant_N_per_A" and value > 0:
+            high = max(min(high, _largest_constant(drive, fastest)), size)
         if name in known:
             reach = known[name] * size
             low, high = max(low, value - reach), min(high, value + reach)
         unknowns.append(Unknown(BASE, name, True, value, low, high))
     return unknowns
+
+
+def _largest_constant(drive: Drive, fastest: float) -> float:
+    """The force constant at which the back e.m.f. alone brakes so much, [N/A].
+
+    Parameters
+    ----------
+    fastest : float, [N s/m]
+    """
+    if drive.resistance_ohm is None:
+        return np.inf
+    back_emf = drive.back_emf_V_s_per_m
+    braking = fastest * drive.resistance_ohm
+    if back_emf is None:
+        return float(np.sqrt(braking))
+    return braking / back_emf if back_emf > 0 else np.inf
 
 
 def _near(drive: StandIn, name: str, value: float) -> tuple[float, float]:

@@ -484,6 +484,8 @@ def drive_of(
         configuration gives none.
     """
     current = max(float(np.max(np.abs(one.input))) for one in train)
+    # Of a voltage what it drives through the winding at rest: laws count currents.
+    current /= simulation.resistance_ohm or 1.0
     displacement = max(float(np.max(np.abs(one.output))) for one in train)
     return Drive(
         effects=simulation.effects,

@@ -239,10 +239,11 @@ class SetFits:
         if not proposed:
             return []
         self._begin(f"{name}, screening", len(proposed))
-        scales = self.rounds.baseline.scales
+        baseline = self.rounds.baseline
         tasks = [
             DiagnosisTask(
-                "+".join(ids) or "base", screen, (self.few, ids, starts, scales),
+                "+".join(ids) or "base", screen,
+                (self.few, ids, baseline.with_resonances(ids, starts), baseline.scales),
                 Screened, {"effects": ids},
             )
             for ids, starts in proposed.items()

@@ -317,6 +317,11 @@ class Parameter:
     limits: tuple[Limit, ...] = ()
     unit: str = ""
 
+    @property
+    def goes_with_force(self) -> bool:
+        """Whether an effect of so many times the force has so many times this value."""
+        return any(one in self.name.split("_") for one in ("N", "kg"))
+
 
 @dataclass(frozen=True)
 class Formula:
@@ -374,6 +379,8 @@ class Effect:
     seen : callable or None
         Values to start from that belong together, from the scales: what the recordings
         show, say. Where there are some they stand in for the parameters' own.
+    resonant : callable or None
+        Values with which it resonates at a frequency [Hz], for an effect that does.
     stated : tuple of Stated
         What a configuration states where that is not the parameters.
     is_rugged : bool
@@ -419,6 +426,7 @@ class Effect:
     needs_free_axis: bool = False
     needs_circuit: bool = False
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
+    resonant: Callable[[float, Scales], tuple[dict[str, float], ...]] | None = None
     stated: tuple[Stated, ...] = ()
     is_rugged: bool = False
     bounces: bool = False

@@ -40,6 +40,29 @@ def linear_equations(
     c : ndarray, shape (n_states,)
         Position and velocity of the load come first, in SI units.
     """
+    built, reading = _built(drive, stiffness)
+    a, b, c = built.matrices(reading, ("u",))
+    return a, b[:, 0], c
+
+
+def equations_with_force(drive: Drive) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """State equations dz/dt = A z + B (u, F), y = c z, with a force F on the load.
+
+    Returns
+    -------
+    A : ndarray, shape (n_states, n_states)
+    B : ndarray, shape (n_states, 2)
+        For the input [A] or [V], and for the force [N].
+    c : ndarray, shape (n_states,)
+    """
+    built, reading = _built(drive, None)
+    return built.matrices(reading, ("u", "F"))
+
+
+def _built(
+    drive: Drive, stiffness: float | None
+) -> tuple["_Equations", dict[str, float]]:
+    """Rates of all states, and what is read of them."""
     effects = {
         one: values
         for one, values in drive_effects(drive).items()
@@ -61,11 +84,11 @@ def linear_equations(
         reading = {"x": 1.0, "twist": 1.0} if seen == "x" else {motor: 1.0}
     ratio = p[slots.SENSOR_LAG_DAMPING_RATIO]
     reading = _add_lag(built, "sensor", reading, p[slots.SENSOR_LAG], ratio)
-    return built.matrices(reading)
+    return built, reading
 
 
 class _Equations:
-    """Rates of named states, each a sum of states and of the input ``u``."""
+    """Rates of named states, each a sum of states, of the input ``u`` and the force ``F``."""
 
     def __init__(self, names: list[str]) -> None:
         self._rates: dict[str, dict[str, float]] = {one: {} for one in names}
@@ -77,12 +100,12 @@ class _Equations:
             own[one] = own.get(one, 0.0) + value
 
     def matrices(
-        self, reading: dict[str, float]
+        self, reading: dict[str, float], inputs: tuple[str, ...]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A, b and c."""
+        """A, B for these inputs, and c."""
         names = list(self._rates)
         a = [[self._rates[row].get(one, 0.0) for one in names] for row in names]
-        b = [self._rates[row].get("u", 0.0) for row in names]
+        b = [[self._rates[row].get(one, 0.0) for one in inputs] for row in names]
         c = [reading.get(one, 0.0) for one in names]
         return np.array(a), np.array(b), np.array(c)
 
@@ -101,6 +124,7 @@ def _add_mechanics(built: _Equations, p: np.ndarray) -> str:
         built.rate("v", _times(bite, 1.0 / mass))
         built.rate(motor, _times(bite, -1.0 / inner))
     built.rate("v", {"x": -p[slots.STIFFNESS] / mass, "v": -p[slots.DAMPING] / mass})
+    built.rate("v", {"F": 1.0 / mass})
     if p[slots.MODE_MASS] > 0.0:
         damping = p[slots.MODE_DAMPING]
         built.rate("part", {"part_v": 1.0, "v": -1.0})

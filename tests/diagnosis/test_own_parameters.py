@@ -18,28 +18,29 @@ FREE = {
 class Valley:
     """A simulation whose gap is a bent valley (Rosenbrock, 1960), with its end at 1, 1."""
 
-    def __init__(self, floor=0.0):
-        self.asked, self.floor = [], floor
+    def __init__(self, floor=0.0, n_floor=1):
+        self.asked = []
+        self.floor = np.full(n_floor, floor / np.sqrt(n_floor))
 
     def __call__(self, signals, values):
         a, b = values["a"], values["b"]
         self.asked.append((a, b))
-        output = np.array([10 * (b - a**2), 1 - a, self.floor])
+        output = np.r_[10 * (b - a**2), 1 - a, self.floor]
         return [SimulatorRun(output, np.zeros(0)) for _ in signals]
 
 
-def signals():
+def signals(size=3):
     return [
         SimpleNamespace(
-            name="one", compared=np.zeros(3), evaluated=slice(None), n_evaluated=3,
-            is_held_out=False,
+            name="one", compared=np.zeros(size), evaluated=slice(None),
+            n_evaluated=size, is_held_out=False,
         )
     ]  # fmt: skip
 
 
 def fitted(valley):
     values = {name: one.value for name, one in FREE.items()}
-    return fit_parameters(valley, signals(), FREE, values)
+    return fit_parameters(valley, signals(2 + valley.floor.size), FREE, values)
 
 
 def test_a_search_that_still_leaves_less_goes_on_to_its_end():
@@ -47,6 +48,29 @@ def test_a_search_that_still_leaves_less_goes_on_to_its_end():
     valley = Valley()
     found = fitted(valley)
     assert found == pytest.approx({"a": 1.0, "b": 1.0}, abs=1e-3)
+
+
+def test_a_search_goes_on_while_slopes_promise_more():
+    # The last of eight evaluations leave 97 % of those before them, half way along.
+    found = fitted(Valley(floor=2.0, n_floor=300))
+    # There, slopes promise 5 % of what is left.
+    assert found["a"] > 0.5
+
+
+def test_parameters_that_keep_their_sign_move_by_factors():
+    """Of 1 and -1 to 300 and -0.02: the product is known well, the ratio hardly."""
+    asked = []
+
+    def simulated(_signals, values):
+        asked.append(values)
+        both, ratio = values["a"] * values["b"], values["a"] / values["b"]
+        output = np.array([10 * np.log(both / -6.0), np.log(ratio / -15000.0), 0.0])
+        return [SimulatorRun(output, np.zeros(0))]
+
+    free = {"a": FreeParameter(1.0, (1e-3, 1e3)), "b": FreeParameter(-1.0)}
+    found = fit_parameters(simulated, signals(), free, {"a": 1.0, "b": -1.0})
+    assert found == pytest.approx({"a": 300.0, "b": -0.02}, rel=1e-3)
+    assert len(asked) <= 32
 
 
 def test_a_search_that_hardly_leaves_less_ends():

@@ -399,8 +399,7 @@ class _Run:
             out[PACE] = (missing - 2 * ratio * y[PACE]) / tau if ratio else 0.0
         if one.has("thermal_gain_loss"):
             tau = one.value("thermal_gain_loss", "time_constant_s")
-            lagged = y[LAGGED] if one.has("actuator_lag") else self.current(t)
-            out[WARMTH] = ((lagged / one.reference) ** 2 - y[WARMTH]) / tau
+            out[WARMTH] = ((self._wanted(t, y) / one.reference) ** 2 - y[WARMTH]) / tau
         if one.has("hysteresis"):
             way = one.value("hysteresis", "yield_m", 1.0)
             ahead = y[YIELDED] * self.way

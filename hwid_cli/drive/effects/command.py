@@ -312,6 +312,15 @@ RIPPLE = Effect(
     seen=_ripples,
 )
 
+# Time constants of heating to begin with, [s]: those within a recording, three at least.
+_HEATING_S = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
+
+
+def _heating_times(scales: Scales) -> tuple[float, ...]:
+    within = sum(one <= scales.duration_s for one in _HEATING_S)
+    return _HEATING_S[: max(within, 3)]
+
+
 THERMAL = Effect(
     id="thermal_gain_loss",
     sentence="the force constant falls as the motor heats up",
@@ -327,7 +336,7 @@ THERMAL = Effect(
         ),
         Parameter(
             "time_constant_s",
-            lambda scales: (0.3, 1.0, 3.0),
+            _heating_times,
             # Faster heating is the force constant's saturation.
             lambda scales: (0.2, max(1.0, 10 * scales.duration_s)),
             places=("THERMAL_TIME",),

@@ -39,6 +39,33 @@ def _frequencies(scales: Scales) -> tuple[float, ...]:
     return tuple(min(one, 0.4 / scales.sample_time_s) for one in found)
 
 
+def _swings_at(frequency_Hz: float, scales: Scales) -> tuple[dict[str, float], ...]:
+    """A light and a heavy part that swing at a frequency."""
+    return tuple(
+        {
+            "mass_kg": share * scales.mass_kg,
+            "frequency_Hz": frequency_Hz,
+            "damping_ratio": 0.03,
+        }
+        for share in (0.05, 0.3)
+    )
+
+
+def _gives_way_at(frequency_Hz: float, scales: Scales) -> tuple[dict[str, float], ...]:
+    """A coupling on which a light or a heavy motor swings against the load at a frequency."""
+    return tuple(
+        {
+            "stiffness_N_per_m": (2 * pi * frequency_Hz) ** 2
+            * scales.mass_kg
+            * share
+            * (1.0 - share),
+            "motor_share": share,
+            "damping_ratio": 0.03,
+        }
+        for share in (0.1, 0.5)
+    )
+
+
 # Frequencies of a free axis are tried up to this share of the sample rate, in such steps.
 _HIGHEST_OF_FREE, _FREQUENCY_STEP = 0.1, 1.5
 
@@ -179,6 +206,7 @@ MODE = Effect(
         ),
     ),
     derived={"MODE_STIFFNESS": _mode_stiffness, "MODE_DAMPING": _mode_damping},
+    resonant=_swings_at,
     confused_with={"input_delay": "a multisine over the whole band"},
     is_linear=True,
 )
@@ -264,6 +292,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
             ),
         ),
         derived={"SENSOR_AT_MOTOR": lambda value: float(sensor == "motor")},
+        resonant=_gives_way_at,
         stated=_ELASTIC_STATED,
         words={"sensor": sensor},
         confused_with=looks_like,

@@ -20,6 +20,27 @@ from hwid_cli.drive.effect import (
 
 # Depth at which contacts of other exponents start as stiff, as a share of the motion.
 _USUAL_DEPTH = 0.05
+# A stop at which the drive turns by so many rad, or loses so many times its speed, in a
+# sample is as good as rigid: what is stiffer looks alike and takes hundreds of steps.
+_RIGID_TURN, _RIGID_LOSS = 6.0, 10.0
+# Its stiffness beside that of the spring, to begin with and at most.
+_STIFF_STOPS, _STIFFEST_STOP = (2.0, 15.0, 100.0), 1e4
+# Its dashpot, beside what the whole force moves at the largest speed.
+_DASHPOTS, _LARGEST_DASHPOT = (0.3, 3.0), 1e3
+
+
+def _stop_bounds(scales: Scales) -> tuple[float, float]:
+    rigid = scales.mass_kg * (_RIGID_TURN / scales.sample_time_s) ** 2
+    least = max(_STIFF_STOPS)
+    most = min(max(rigid / scales.stiffness_N_per_m, least), _STIFFEST_STOP)
+    return 0.05 * scales.stiffness_N_per_m, most * scales.stiffness_N_per_m
+
+
+def _dashpot_bounds(scales: Scales) -> tuple[float, float]:
+    usual = scales.force_N / scales.velocity_m_per_s
+    rigid = _RIGID_LOSS * scales.mass_kg / scales.sample_time_s
+    most = min(max(rigid / usual, max(_DASHPOTS)), _LARGEST_DASHPOT)
+    return 1e-3 * usual, most * usual
 
 
 def _periods(scales: Scales) -> tuple[float, ...]:
@@ -103,8 +124,8 @@ END_STOP = Effect(
         ),
         Parameter(
             "stiffness_N_per_m",
-            shares_of("stiffness_N_per_m", 2.0, 15.0, 100.0),
-            span_of("stiffness_N_per_m", 0.05, 1e4),
+            shares_of("stiffness_N_per_m", *_STIFF_STOPS),
+            _stop_bounds,
             places=("STOP_STIFFNESS",),
             limits=(NOT_NEGATIVE,),
         ),
@@ -135,8 +156,8 @@ ONE_SIDED = Effect(
         ),
         Parameter(
             "stiffness_N_per_m",
-            shares_of("stiffness_N_per_m", 2.0, 15.0, 100.0),
-            span_of("stiffness_N_per_m", 0.05, 1e4),
+            shares_of("stiffness_N_per_m", *_STIFF_STOPS),
+            _stop_bounds,
             places=("SIDE_STIFFNESS",),
             limits=(NOT_NEGATIVE,),
         ),
@@ -211,12 +232,9 @@ def _with_dashpot(stop: Effect, slots: str, sentence: str) -> Effect:
         Parameter(
             "damping_N_s_per_m",
             lambda scales: tuple(
-                share * scales.force_N / scales.velocity_m_per_s for share in (0.3, 3.0)
+                share * scales.force_N / scales.velocity_m_per_s for share in _DASHPOTS
             ),
-            lambda scales: (
-                1e-3 * scales.force_N / scales.velocity_m_per_s,
-                1e3 * scales.force_N / scales.velocity_m_per_s,
-            ),
+            _dashpot_bounds,
             places=(f"{slots}_DASHPOT",),
             default=0.0,
             limits=(NOT_NEGATIVE,),

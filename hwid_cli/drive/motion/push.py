@@ -72,11 +72,14 @@ def has_losses(p: np.ndarray) -> bool:
 def is_straight(p: np.ndarray) -> bool:
     """Return whether straight pieces of the command give straight pieces of force.
 
+    And whether nothing has to be carried on from piece to piece, as a temperature has.
+
     Parameters
     ----------
     p : ndarray, shape (N_SLOTS,)
     """
-    is_bent = not depends_on_motion(p) and has_losses(p)
+    is_bent = p[slots.THERMAL_LOSS] != 0.0
+    is_bent = is_bent or (not depends_on_motion(p) and has_losses(p))
     is_bent = is_bent or p[slots.LAG] > 0.0 or p[slots.PERIODIC_FORCE] != 0.0
     return not is_bent
 

@@ -656,7 +656,8 @@ static int drive_has_losses(double *p)
 static int drive_is_straight(double *p)
 {
     int is_bent = 0;
-    is_bent = (!drive_depends_on_motion(p)) && drive_has_losses(p);
+    is_bent = p[THERMAL_LOSS] != 0.0;
+    is_bent = is_bent || ((!drive_depends_on_motion(p)) && drive_has_losses(p));
     is_bent = is_bent || (p[LAG] > 0.0) || (p[PERIODIC_FORCE] != 0.0);
     return !is_bent;
 }
