@@ -166,15 +166,22 @@ def law_in_words(
     share = 100 * criteria.evidence(verdict.chosen, base).explained
     known = known_terms(law)
     terms = " and ".join(f"{name} ({term})" for term, name in known.items())
-    text = (
-        f"The simulation lacks {terms} and something that is no effect of the catalogue; a "
-        "formula holds for both"
-        if known
-        else "No effect of the catalogue is what the simulation lacks, but a formula holds"
-    )
+    ratio = criteria.ratio(verdict.chosen)
+    if ratio > STILL_LARGE:
+        # No statement of a fact while so much is left.
+        text = (
+            "No effect of the catalogue explains what the simulation leaves. As a lead"
+        )
+        text += f", with {terms}" if known else ""
+        text += ", a formula takes most of it"
+    elif known:
+        text = f"The simulation lacks {terms} and something that is no effect of the "
+        text += "catalogue; a formula holds for both"
+    else:
+        text = "No effect of the catalogue is what the simulation lacks, but a formula holds"
     return (
         f"{text}: {_in_numbers(law, effect)}. With it the error on held-out recordings falls from "
-        f"{criteria.ratio(base):.3g} to {criteria.ratio(verdict.chosen):.3g} times the "
+        f"{criteria.ratio(base):.3g} to {ratio:.3g} times the "
         f"noise ({share:.3g} % of what was left is explained)."
         f"{_how_sure(law)}{_rest(criteria, verdict)}"
     )

@@ -481,3 +481,20 @@ def test_a_law_whose_terms_others_replace_is_a_curve(inclusion, is_curve):
     )  # fmt: skip
     assert ("Take it as a curve" in said) is is_curve
     assert ("chosen again in 30 %" in said) is is_curve
+
+
+@pytest.mark.parametrize(("left", "is_fact"), [(110.0, True), (2_000.0, False)])
+@pytest.mark.parametrize("term", ["x*abs(x)", "sign(v)"])
+def test_a_law_that_leaves_much_is_a_lead_and_no_fact(left, is_fact, term):
+    fit = made_up(("law",), left)
+    terms = (
+        LawTerm(term, 3.0, 2.0, 4.0, "N", 1.0),
+        LawTerm("x**3", 1.0, 0.5, 2, "N", 1),
+    )
+    said = law_in_words(
+        CRITERIA, base(90_000.0), DiagnosisVerdict("law", False, fit, ()),
+        Law("F", "force", terms), SimpleNamespace(equation="F = ..."),
+    )  # fmt: skip
+    assert ("formula holds" in said) is is_fact
+    assert ("As a lead" in said) is not is_fact
+    assert ("What remains is not explained" in said) is not is_fact
