@@ -92,6 +92,7 @@ def _fitted(
     if np.isfinite(most):
         searches.insert(0, _FIRST_EVALUATIONS)
         enough = _HARDLY_PROMISED
+    before = np.inf
     by_chance = min(_BY_CHANCE * start.size / gap.size, 0.5)
     for evaluations in searches:
         found = scipy.optimize.least_squares(
@@ -102,9 +103,12 @@ def _fitted(
         if 2.0 * found.cost > most:
             return None
         is_first = evaluations == _FIRST_EVALUATIONS
-        promised = _promised(found)
-        if found.status > 0 or not (is_first or promised > max(enough, by_chance)):
+        is_more = _promised(found) > max(enough, by_chance)
+        # What corners of a simulation promise never comes.
+        has_come = found.cost < (1.0 - enough) * before
+        if found.status > 0 or not (is_first or (is_more and has_come)):
             break
+        before = found.cost
     return gap.at(start)
 
 
