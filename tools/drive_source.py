@@ -66,7 +66,6 @@ LEFT_OUT = {
     "glide_plain",
     "glide_inner",
     "which_matrix",
-    "bounds",
     "is_slow",
     "_swing",
     "stays_between",

@@ -22,6 +22,23 @@ from tests.export.model_examples import (
 STEP = 1e-3
 # Steps without tables of matrices round otherwise; friction does not enlarge that.
 PROMISED = 1e-12
+# The program has no tables of matrices for halves of a sample: where hwid takes exponential
+# steps, it takes Runge-Kutta steps. A gear that rattles enlarges the difference.
+OTHER_STEPS = 5e-5
+INNER = {"gear_backlash", "elastic_coupling", "second_mode"}
+CURVED = {
+    "cogging",
+    "cubic_stiffness",
+    "end_stop",
+    "gravity",
+    "load_friction",
+    "hysteresis",
+    "one_sided_stop",
+    "position_friction",
+    "quadratic_drag",
+    "quadratic_stiffness",
+    "stribeck_friction",
+}
 # A simulation starts in one way only.
 ONE_START = MAIN.replace("init_empty", "init").replace("init_steady", "init")
 BACKLASH = {"output_backlash": {"half_gap_m": 1e-3}}
@@ -120,7 +137,9 @@ def check(folder, effects, values, n):
     folder.mkdir(exist_ok=True)
     u = example_command(n, 0.004 if "controller" in values else 1.0)
     found = c_output(compiled(folder, source, ONE_START), u)
-    assert deviation(found, predict(exported, u)) <= PROMISED
+    has_inner = INNER & set(effects) or "resistance_ohm" in values
+    promised = OTHER_STEPS if has_inner and CURVED & set(effects) else PROMISED
+    assert deviation(found, predict(exported, u)) <= promised
 
 
 @pytest.mark.thorough

@@ -103,7 +103,7 @@ static double glide_plain(HWID_NAME(state) *s, double *push, double length, doub
                 double limit;
                 state[X] = x;
                 state[V] = v;
-                limit = drive_step_limit(state, memory, push, done, p);
+                limit = drive_step_limit(state, memory, push, done, 0, p);
                 limit = most(limit, length / MOST_STEPS);
                 if (limit < left) {
                     h = left / ceil(left / limit);

@@ -3533,6 +3533,57 @@ static double drive_time_of(int event, double *state, double *trial, double *mem
     return time;
 }
 
+static tuple_dd drive_bounds(double x, double *p)
+{
+    double low = 0.0;
+    double high = 0.0;
+    int n = 0;
+    double edge = 0.0;
+    low = -HUGE_VAL;
+    high = HUGE_VAL;
+    for (n = 0; n < 5; ++n) {
+        edge = HUGE_VAL;
+        if ((n < 2) && (p[SPRING_GAP] > 0.0)) {
+            edge = p[SPRING_GAP];
+        }
+        if (((2 <= n) && (n < 4)) && (p[STOP_STIFFNESS] > 0.0)) {
+            edge = p[STOP_POSITION];
+        }
+        if ((n == 4) && (p[SIDE_STIFFNESS] > 0.0)) {
+            edge = p[SIDE_POSITION];
+        }
+        if (edge == HUGE_VAL) {
+            continue;
+        }
+        if ((n % 2) == 1) {
+            edge = -edge;
+        }
+        if ((x > edge) || ((x == edge) && (edge < 0.0))) {
+            low = most(low, edge);
+        } else {
+            high = least(high, edge);
+        }
+    }
+    if (p[SECOND_STIFFNESS] > 0.0) {
+        edge = p[SECOND_POSITION];
+        if ((x > edge) || ((x == edge) && (edge < 0.0))) {
+            low = most(low, edge);
+        } else {
+            high = least(high, edge);
+        }
+    }
+    if (p[HAS_ZERO_EDGE] != 0.0) {
+        if (x > 0.0) {
+            low = most(low, 1e-200);
+        } else {
+            if (x < 0.0) {
+                high = least(high, -1e-200);
+            }
+        }
+    }
+    return (tuple_dd){low, high};
+}
+
 static tuple_iiiiid drive_kind_of(double *p)
 {
     int has_inner = 0;
