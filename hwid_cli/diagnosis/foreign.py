@@ -19,6 +19,7 @@ from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.further_effects import with_further_effect
 from hwid_cli.diagnosis.laws import MOST_OF_NAMED
 from hwid_cli.diagnosis.leads_in_simulation import leads_in_simulation
+from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence
@@ -88,8 +89,10 @@ def diagnose_foreign(
     runs, given, refitted = begun.runs, list(begun.given), dict(simulator.values)
     if simulator.free and not simulator.is_extended:
         on_round("its parameters", 0)
-        signals = begun.problem.signals
-        refitted = fit_parameters(runs.tried, signals, simulator.free, refitted)
+        signals, noise = begun.problem.signals, noise_floor(begun.problem)
+        refitted = fit_parameters(
+            runs.tried, signals, simulator.free, refitted, noise.rms
+        )
         given = runs.of(signals, refitted)
     search = _searched(begun, given, refitted, options, on_round)
     found, values = search.findings, search.values

@@ -1,29 +1,31 @@
 """The parameters of a simulation of the user's own, fitted through its runs."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import scipy
 
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.simulator import derivative, difference_for
+from hwid_cli.records.diagnosis import STILL_LARGE
 from hwid_cli.records.programs import FreeParameter, SimulatorRun
 
-# Evaluations of a search; it goes on, so many times at most, where a straight
-# continuation of the runs would still take this share away. Bent valleys, as of parameters
-# that are known as a product, take many short steps.
+# Evaluations of a search; it goes on, so many times at most, where the last few of them
+# have still brought it below this share. Near a resonance it is far from its end.
 _MOST_EVALUATIONS, _MOST_SEARCHES = 8, 4
+# Or where little more than the noise is left, the slopes promise to take this share of it
+# away, and so much has come before: bent valleys, as of parameters that are known as a
+# product, take many short steps. What is missing would be imitated the better, too.
 _STILL_PROMISED = 0.05
-# Beside a rival, where the values found are the answer, it goes on for less, [-]; the
-# first one has so many evaluations.
-_HARDLY_PROMISED = 0.001
+# Shares that chance alone promises for each parameter, over the number of samples; at most.
+_BY_CHANCE, _MOST_BY_CHANCE = 2.0, 0.5
+# Beside a rival, where the values found are the answer, it goes on while they leave less
+# than this share, [-]; the first one has so many evaluations.
+_HARDLY_FALLS = 0.999
 _FIRST_EVALUATIONS = 4
-# Shares that chance alone promises for each parameter, over the number of samples.
-_BY_CHANCE = 2.0
-# A parameter that keeps its sign moves by factors, within e^+-14.
-_LARGEST_EXPONENT = 14.0
+_LAST_FEW, _STILL_FALLS = 3, 0.8
 # Recordings that they are fitted to.
 _MOST_FITTED = 6
 
@@ -36,6 +38,7 @@ def fit_parameters(
     signals: Sequence[Signals],
     free: Mapping[str, FreeParameter],
     values: dict[str, float],
+    noise_rms: float = 0.0,
 ) -> dict[str, float]:
     """Parameters fitted to training recordings within their bounds.
 
@@ -45,9 +48,12 @@ def fit_parameters(
         Runs, with what is known beside the parameters.
     values : dict of str to float
         All of them, to begin with; they stay where no run is possible with them.
+    noise_rms : float, [output unit]
+        Of the recordings; near it a search goes on for less.
     """
     chosen = _chosen(signals)
-    return _fitted(ask, chosen, free, values, np.inf) or values
+    near = sum(one.n_evaluated for one in chosen) * (STILL_LARGE * noise_rms) ** 2
+    return _fitted(ask, chosen, free, values, np.inf, near) or values
 
 
 def fit_beside(
@@ -82,18 +88,24 @@ def _fitted(
     free: Mapping[str, FreeParameter],
     values: dict[str, float],
     most: float,
+    near: float = 0.0,
 ) -> dict[str, float] | None:
-    """Fitted parameters; None where runs fail or leave more than so much, [output unit^2]."""
-    gap = _Gap(ask, signals, free, values, by_factors=True)
+    """Fitted parameters; None where runs fail or leave more than so much, [output unit^2].
+
+    Parameters
+    ----------
+    near : float, [output unit squared]
+        What leaves less than this is near the noise.
+    """
+    gap = _Gap(ask, signals, free, values)
     start = np.clip(gap.coordinates(values), gap.low, gap.high)
     if not np.isfinite(gap.errors(start)).all():
         return None
-    searches, enough = [_MOST_EVALUATIONS] * _MOST_SEARCHES, _STILL_PROMISED
+    searches, falls = [_MOST_EVALUATIONS] * _MOST_SEARCHES, _STILL_FALLS
     if np.isfinite(most):
         searches.insert(0, _FIRST_EVALUATIONS)
-        enough = _HARDLY_PROMISED
+        falls = _HARDLY_FALLS
     before = np.inf
-    by_chance = min(_BY_CHANCE * start.size / gap.size, 0.5)
     for evaluations in searches:
         found = scipy.optimize.least_squares(
             gap.errors, start, gap.slopes, (gap.low, gap.high), x_scale=1.0,
@@ -103,21 +115,23 @@ def _fitted(
         if 2.0 * found.cost > most:
             return None
         is_first = evaluations == _FIRST_EVALUATIONS
-        is_more = _promised(found) > max(enough, by_chance)
-        # What corners of a simulation promise never comes.
-        has_come = found.cost < (1.0 - enough) * before
-        if found.status > 0 or not (is_first or (is_more and has_come)):
+        goes_on = is_first or gap.falls_by(falls)
+        has_come = found.cost < (1.0 - _STILL_PROMISED) * before
+        if 2.0 * found.cost <= near and has_come:
+            goes_on = goes_on or _promises_more(found)
+        if found.status > 0 or not goes_on:
             break
         before = found.cost
     return gap.at(start)
 
 
-def _promised(found: scipy.optimize.OptimizeResult) -> float:
-    """Share of what is left that the slopes say could still be taken away, [-]."""
-    free = found.active_mask == 0
-    directions, _ = np.linalg.qr(found.jac[:, free])
+def _promises_more(found: Any) -> bool:
+    """Whether slopes say that a good part of what is left could still be taken away."""
+    directions, _ = np.linalg.qr(found.jac[:, found.active_mask == 0])
     along = directions.T @ found.fun
-    return float(along @ along) / max(float(found.fun @ found.fun), 1e-300)
+    promised = float(along @ along) / max(float(found.fun @ found.fun), 1e-300)
+    by_chance = min(_BY_CHANCE * found.x.size / found.fun.size, _MOST_BY_CHANCE)
+    return promised > max(_STILL_PROMISED, by_chance)
 
 
 def linearised(
@@ -135,7 +149,7 @@ def linearised(
     ndarray, shape (n_evaluated, n_free), [output unit]
         Their derivatives by each parameter over its size.
     """
-    gap = _Gap(ask, signals, free, values, by_factors=False)
+    gap = _Gap(ask, signals, free, values)
     here = gap.coordinates(values)
     errors = gap.errors(here)
     if not np.isfinite(errors).all():
@@ -160,45 +174,8 @@ def errors_of(signals: Sequence[Signals], found: Sequence[SimulatorRun]) -> np.n
     )
 
 
-@dataclass(frozen=True)
-class _Coordinate:
-    """A parameter over its size; the logarithm of that where its sign stays.
-
-    Parameters
-    ----------
-    size : float
-        With its sign where it stays.
-    """
-
-    size: float
-    is_log: bool
-    limits: tuple[float, float]
-
-    @classmethod
-    def of(cls, free: FreeParameter, by_factors: bool) -> "_Coordinate":
-        low, high = free.limits
-        size = free.value or 1.0
-        if by_factors and low / size > 0 and high / size > 0:
-            ends = sorted(np.log([low / size, high / size]).tolist())
-            most = _LARGEST_EXPONENT
-            return cls(size, True, (max(ends[0], -most), min(ends[1], most)))
-        size = abs(size)
-        return cls(size, False, (low / size, high / size))
-
-    def at(self, value: float) -> float:
-        """Coordinate of a value, [-]."""
-        share = value / self.size
-        if not self.is_log:
-            return share
-        return float(np.log(share)) if share > 0 else self.limits[0]
-
-    def value(self, coordinate: float) -> float:
-        """Value at a coordinate."""
-        return self.size * (float(np.exp(coordinate)) if self.is_log else coordinate)
-
-
 class _Gap:
-    """What a simulation leaves of recordings, by the coordinates of its parameters.
+    """What a simulation leaves of recordings, by its parameters over their sizes.
 
     Parameters
     ----------
@@ -206,8 +183,6 @@ class _Gap:
         What moves; no difference reaches beyond its bounds.
     values : mapping of str to float
         Of all parameters.
-    by_factors : bool
-        Whether parameters that keep their sign move by factors.
     """
 
     def __init__(
@@ -216,29 +191,30 @@ class _Gap:
         signals: Sequence[Signals],
         free: Mapping[str, FreeParameter],
         values: Mapping[str, float],
-        *,
-        by_factors: bool,
     ) -> None:
         self._ask, self._signals, self._values = ask, signals, values
-        self._free = {
-            name: _Coordinate.of(one, by_factors) for name, one in free.items()
-        }
-        limits = [one.limits for one in self._free.values()]
-        self.low, self.high = np.array(limits).reshape(-1, 2).T
-        self.size = sum(one.n_evaluated for one in signals)
+        self._sizes = {name: abs(one.value) or 1.0 for name, one in free.items()}
+        limits = np.array([one.limits for one in free.values()]).reshape(-1, 2)
+        self.low, self.high = limits.T / np.array(list(self._sizes.values()))
+        self._size = sum(one.n_evaluated for one in signals)
+        self._costs: list[float] = []
         # A search that goes on begins where its last part has been.
         self._asked: dict[bytes, np.ndarray] = {}
         self._slopes: dict[int, np.ndarray] = {}
         self._sloped: tuple[bytes, np.ndarray] | None = None
 
     def coordinates(self, values: Mapping[str, float]) -> np.ndarray:
-        """Coordinates of the free parameters, shape (n_free,), [-]."""
-        return np.array([one.at(values[name]) for name, one in self._free.items()])
+        """Free parameters over their sizes, shape (n_free,), [-]."""
+        return np.array([values[name] / size for name, size in self._sizes.items()])
+
+    def falls_by(self, share: float) -> bool:
+        """Whether the last few evaluations have left less than a share of those before."""
+        return min(self._costs) < share * min(self._costs[:-_LAST_FEW])
 
     def at(self, coordinates: np.ndarray) -> dict[str, float]:
         """All parameters."""
-        pairs = zip(self._free.items(), coordinates.tolist(), strict=True)
-        return {**self._values, **{name: one.value(q) for (name, one), q in pairs}}
+        pairs = zip(self._sizes.items(), coordinates.tolist(), strict=True)
+        return {**self._values, **{name: size * q for (name, size), q in pairs}}
 
     def errors(self, coordinates: np.ndarray) -> np.ndarray:
         """Measured less simulated; infinite where no run is possible.
@@ -247,7 +223,8 @@ class _Gap:
         """
         place = coordinates.tobytes()
         if place not in self._asked:
-            self._asked[place] = self._left(coordinates)
+            left = self._asked[place] = self._left(coordinates)
+            self._costs.append(float(left @ left))
         return self._asked[place]
 
     def slopes(self, coordinates: np.ndarray) -> np.ndarray:
@@ -288,5 +265,5 @@ class _Gap:
     def _left(self, coordinates: np.ndarray) -> np.ndarray:
         found = self._ask(self._signals, self.at(coordinates))
         if found is None:
-            return np.full(self.size, np.inf)
+            return np.full(self._size, np.inf)
         return errors_of(self._signals, found)

@@ -10,12 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import (
-    fitted_drive,
-    rebuilt,
-    with_values,
-    without_base,
-)
+from hwid_cli.diagnosis.candidate import fitted_drive, rebuilt, without_base
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.parameters import simulate_at
@@ -33,20 +28,15 @@ from hwid_cli.diagnosis.turns import (
     pushed,
     where_it_starts,
 )
-from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.drive import Drive
-from hwid_cli.records.programs import FreeParameter, SimulatorRun
+from hwid_cli.records.programs import SimulatorRun
 
 # The simulation's own parameters rather than further forces, if no more squares are left.
 _PREFERRED = 2.0
 # An effect through the input that leaves more than this share of what the base leaves is
 # tried at the force input as well.
 _CUT_OFF = 0.9
-# Name of the factor of a stand-in's forces beside a simulation's parameters; a gain that
-# moves by less needs none, and it stays within a factor of what the gain says.
-_SCALE = "scale of the stand-in's forces"
-_SAME_GAIN, _REACH_OF_SCALE = 0.02, 3.0
 
 
 def settled(
@@ -141,45 +131,14 @@ def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
         signals: Sequence[Signals], values: Mapping[str, float]
     ) -> list[SimulatorRun] | None:
         some = replace(problem, signals=tuple(signals))
-        scale = values.get(_SCALE, 1.0)
-        own = {name: one for name, one in values.items() if name != _SCALE}
-        each = [scale * forces[one.name] for one in signals]
-        return pushed(runs, some, each, turn.at_force, own)
+        return pushed(
+            runs, some, [forces[one.name] for one in signals], turn.at_force, values
+        )
 
-    scales = _scale_of_forces(problem.drive, changed.drive)
-    free = {**runs.simulator.free, **scales}
-    begun = {**turn.values, **{name: one.value for name, one in scales.items()}}
-    values = fit_parameters(ask, problem.signals, free, begun)
-    scale = values.pop(_SCALE, 1.0)
-    each = [scale * forces[one.name] for one in problem.signals]
-    scaled = replace(turn, fit=_with_forces(fit, scale))
-    there = begun_with(scaled, runs, values, each)
+    values = fit_parameters(ask, problem.signals, runs.simulator.free, turn.values)
+    each = [forces[one.name] for one in problem.signals]
+    there = begun_with(turn, runs, values, each)
     return replace(turn, problem=held(problem)) if there is None else there
-
-
-def _with_forces(fit: CandidateFit, scale: float) -> CandidateFit:
-    """The fit with effects whose forces are so many times as large."""
-    pairs = zip(fit.names, fit.values.tolist(), strict=True)
-    larger = {
-        ref: scale * value
-        for ref, value in pairs
-        if ref.owner in fit.effects
-        and CATALOGUE[ref.owner].parameter(ref.parameter).goes_with_force
-    }
-    return with_values(fit, larger)
-
-
-def _scale_of_forces(before: Drive, after: Drive) -> dict[str, FreeParameter]:
-    """By what a stand-in's forces may have to be multiplied, where its gain has moved.
-
-    Its mass stays, and its gain, damping and spring grow in its place; a simulation whose
-    gain is known moves its mass, and its forces are smaller by as much.
-    """
-    share = after.force_constant_N_per_A / before.force_constant_N_per_A
-    if abs(share - 1.0) < _SAME_GAIN or not share > 0:
-        return {}
-    reach = _REACH_OF_SCALE * max(share, 1.0 / share)
-    return {_SCALE: FreeParameter(1.0 / share, (1.0 / reach, reach))}
 
 
 def begun_with(

@@ -317,11 +317,6 @@ class Parameter:
     limits: tuple[Limit, ...] = ()
     unit: str = ""
 
-    @property
-    def goes_with_force(self) -> bool:
-        """Whether an effect of so many times the force has so many times this value."""
-        return any(one in self.name.split("_") for one in ("N", "kg"))
-
 
 @dataclass(frozen=True)
 class Formula:
