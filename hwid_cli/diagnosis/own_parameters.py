@@ -114,12 +114,13 @@ def _fitted(
         start = found.x
         if 2.0 * found.cost > most:
             return None
+        if found.status > 0:
+            break
         is_first = evaluations == _FIRST_EVALUATIONS
-        goes_on = is_first or gap.falls_by(falls)
         has_come = found.cost < (1.0 - _STILL_PROMISED) * before
-        if 2.0 * found.cost <= near and has_come:
-            goes_on = goes_on or _promises_more(found)
-        if found.status > 0 or not goes_on:
+        may_follow = 2.0 * found.cost <= near and has_come
+        goes_on = is_first or gap.falls_by(falls)
+        if not (goes_on or (may_follow and _promises_more(found))):
             break
         before = found.cost
     return gap.at(start)

@@ -580,7 +580,7 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
     monkeypatch.setattr(
         foreign,
         "fit_parameters",
-        lambda ask, signals, free, values: {**values, "c": 20.0},
+        lambda ask, signals, free, values, noise: {**values, "c": 20.0},
     )
     monkeypatch.setattr(
         foreign, "_told", lambda found, simulator, values: Told(found, values[1]["c"])
