@@ -72,7 +72,7 @@ LEFT_OUT = {
     "is_exponential",
     "_curved_force",
     "_after",
-    "_without",
+    "after_row",
     "step_exponential",
     "fill",
     "apply",

@@ -3,7 +3,7 @@
 In time a resonance has to be known to a cycle in the longest ringing before a search finds
 it, and a base with one resonance in the place of two is damped beyond recognition. In
 spectra a search from many frequencies costs next to nothing. docs/method_diagnosis.md,
-eq. (D20a).
+eq. (D19b).
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -63,6 +63,19 @@ def steady_force(memory: np.ndarray, p: np.ndarray) -> float:
 
 
 @compiled(**INNER)
+def slowest_straight(p: np.ndarray) -> float:
+    """Return the speed above which friction near rest may be left out, [m/s].
+
+    Parameters
+    ----------
+    p : ndarray, shape (N_SLOTS,)
+    """
+    if p[slots.STATIC_EXCESS] == 0.0:
+        return 0.0
+    return speed_of_excess(STILL_FAST, p)
+
+
+@compiled(**INNER)
 def stays(p: np.ndarray) -> bool:
     """Return whether nothing curved goes on in a drive whose mass is held.
 

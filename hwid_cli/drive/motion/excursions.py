@@ -10,8 +10,8 @@ import numpy as np
 from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
 from hwid_cli.drive.motion.corners import has_teeth
-from hwid_cli.drive.motion.events import ON_EDGE, STILL_FAST
-from hwid_cli.drive.motion.forces import acceleration, moved_mass, speed_of_excess
+from hwid_cli.drive.motion.events import ON_EDGE, slowest_straight
+from hwid_cli.drive.motion.forces import acceleration, moved_mass
 from hwid_cli.drive.motion.state import MOTOR_V, PART_V, WAY, V, X
 
 # Where events are watched, a step turns nothing by more than this, [rad]: a longer one
@@ -136,9 +136,7 @@ def stays_between(
     swing = _swing(state, memory, push, done, p)
     swing = RESERVE * max(swing, _swing(trial, memory, push, done + h, p))
     if is_watched:
-        slow = 0.0
-        if p[slots.STATIC_EXCESS] != 0.0:
-            slow = speed_of_excess(STILL_FAST, p)
+        slow = slowest_straight(p)
         way = memory[WAY]
         if min(way * state[V], way * trial[V]) - swing <= slow:
             return False

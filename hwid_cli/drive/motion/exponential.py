@@ -11,7 +11,7 @@ from hwid_cli.compiled import INNER, compiled
 from hwid_cli.drive import slots
 from hwid_cli.drive.motion.events import set_inputs, steady_force
 from hwid_cli.drive.motion.forces import own_force, resisting
-from hwid_cli.drive.motion.linear import N_INPUT, OTHERS, STEADY, apply
+from hwid_cli.drive.motion.linear import OTHERS, STEADY, after_row, apply
 from hwid_cli.drive.motion.push import depends_on_motion, has_losses
 from hwid_cli.drive.motion.springs import touch
 from hwid_cli.drive.motion.state import N_STATE, WAY, V, X
@@ -126,8 +126,8 @@ def step_exponential(
     linear = corner[1], corner[2] - steady_force(memory, p)
     whole, half = which
     apply(matrices, whole, state, inputs, trial, active)
-    middle = _without(matrices, half, X, state, inputs, active)
-    middle_speed = _without(matrices, half, V, state, inputs, active)
+    middle = after_row(matrices, half, X, state, inputs, active)
+    middle_speed = after_row(matrices, half, V, state, inputs, active)
     free, end = (middle, middle_speed), (trial[X], trial[V])
     mid = done + 0.5 * h
     first = _curved_force((state[X], state[V]), memory, push, done, linear, p)
@@ -145,21 +145,3 @@ def step_exponential(
         trial[row] += matrices[whole, row, _CONSTANT] * first
         trial[row] += matrices[whole, row, _SLOPE] * slope
         trial[row] += matrices[whole, row, _BEND] * bend
-
-
-@compiled(**INNER)
-def _without(
-    matrices: np.ndarray,
-    which: int,
-    row: int,
-    state: np.ndarray,
-    inputs: np.ndarray,
-    active: np.ndarray,
-) -> float:
-    """Return one place of the state after a step, without the curved force."""
-    total = 0.0
-    for n in range(active.size):
-        total += matrices[which, row, active[n]] * state[active[n]]
-    for column in range(N_INPUT):
-        total += matrices[which, row, N_STATE + column] * inputs[column]
-    return total

@@ -288,6 +288,30 @@ def fill(
 
 
 @compiled(**INNER)
+def after_row(
+    matrices: np.ndarray,
+    which: int,
+    row: int,
+    state: np.ndarray,
+    inputs: np.ndarray,
+    active: np.ndarray,
+) -> float:
+    """Return one place of the state after a step by the matrix of its length.
+
+    Parameters
+    ----------
+    matrices, which, state, inputs, active
+        As in ``apply``.
+    """
+    total = 0.0
+    for n in range(active.size):
+        total += matrices[which, row, active[n]] * state[active[n]]
+    for column in range(N_INPUT):
+        total += matrices[which, row, N_STATE + column] * inputs[column]
+    return total
+
+
+@compiled(**INNER)
 def apply(
     matrices: np.ndarray,
     which: int,
@@ -306,11 +330,6 @@ def apply(
     active : ndarray, shape (n_active,)
         From ``active_states``.
     """
-    for a in range(active.size):
-        row = active[a]
-        total = 0.0
-        for b in range(active.size):
-            total += matrices[which, row, active[b]] * state[active[b]]
-        for column in range(N_INPUT):
-            total += matrices[which, row, N_STATE + column] * inputs[column]
-        out[row] = total
+    for n in range(active.size):
+        row = active[n]
+        out[row] = after_row(matrices, which, row, state, inputs, active)

@@ -11,14 +11,13 @@ from hwid_cli.drive import slots
 from hwid_cli.drive.motion.corners import corner_of
 from hwid_cli.drive.motion.curved import is_curved_here, step_limit, step_plain
 from hwid_cli.drive.motion.events import (
-    STILL_FAST,
     excess,
     set_inputs,
+    slowest_straight,
     steady_force,
 )
 from hwid_cli.drive.motion.excursions import bounds, is_slow, stays_between
 from hwid_cli.drive.motion.exponential import is_exponential, step_exponential
-from hwid_cli.drive.motion.forces import speed_of_excess
 from hwid_cli.drive.motion.hysteresis import remember
 from hwid_cli.drive.motion.linear import (
     DRIVEN,
@@ -106,9 +105,7 @@ def glide_plain(
         low, high = bounds(state[X], p)
         corner = corner_of(state, 0.0, p)
     steady = steady_force(memory, p) - corner[2]
-    slow = 0.0
-    if p[slots.STATIC_EXCESS] != 0.0:
-        slow = speed_of_excess(STILL_FAST, p)
+    slow = slowest_straight(p)
     is_held = is_watched and way == 0.0
     done, x, v = 0.0, state[X], state[V]
     n = N_STATE + DRIVEN
@@ -223,9 +220,7 @@ def glide_inner(
     if is_held and excess(state, memory, push, 0.0, p)[1] > 0.0:
         return 0.0
     corner = corner_of(state, push[DRIVE], p)
-    slow = 0.0
-    if p[slots.STATIC_EXCESS] != 0.0:
-        slow = speed_of_excess(STILL_FAST, p)
+    slow = slowest_straight(p)
     done = 0.0
     # Nothing may happen within a step; most pieces are far from where it could.
     is_short = is_held or not is_slow(length, corner, p)
