@@ -69,6 +69,7 @@ LEFT_OUT = {
     "is_slow",
     "_swing",
     "stays_between",
+    "slowest_straight",
     "is_exponential",
     "_curved_force",
     "_after",

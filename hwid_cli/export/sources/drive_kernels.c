@@ -3270,14 +3270,6 @@ static double drive_steady_force(double *memory, double *p)
     return force;
 }
 
-static double drive_slowest_straight(double *p)
-{
-    if (p[STATIC_EXCESS] == 0.0) {
-        return 0.0;
-    }
-    return drive_speed_of_excess(5.0, p);
-}
-
 static int drive_stays(double *p)
 {
     return p[GEAR_STIFFNESS] == 0.0;
