@@ -5,7 +5,7 @@ docs/method_diagnosis.md, eq. (D20).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -83,6 +83,11 @@ class Findings:
         That the re-fitted base lacks.
     pieces : JudgedPieces or None
         Fits that all of this was joined from, where whole recordings cannot judge.
+    own_base : CandidateFit or None
+        What a simulation of the user's leaves itself with its parameters fitted, where a
+        stand-in's base, of which more is free, leaves less.
+    own_before : list of Compared
+        Its runs beside the recordings.
     other : OtherCommand or None
         The chosen effects beside the command that was not taken, where the recordings do
         not tell whether it is held between samples.
@@ -102,6 +107,8 @@ class Findings:
     verdict: DiagnosisVerdict
     law: LawFound | None = None
     pieces: JudgedPieces | None = None
+    own_base: CandidateFit | None = None
+    own_before: list[Compared] = field(default_factory=list)
     other: OtherCommand | None = None
     warnings: tuple[str, ...] = ()
 

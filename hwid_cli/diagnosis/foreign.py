@@ -20,6 +20,7 @@ from hwid_cli.diagnosis.further_effects import with_further_effect
 from hwid_cli.diagnosis.laws import MOST_OF_NAMED
 from hwid_cli.diagnosis.leads_in_simulation import leads_in_simulation
 from hwid_cli.diagnosis.noise import noise_floor
+from hwid_cli.diagnosis.own_base import judged_by_own_base, with_own_base
 from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence
@@ -101,6 +102,8 @@ def diagnose_foreign(
             runs, begun.problem, found.verdict, refitted, options, on_round
         )
         found, values = law or (found, values)
+    if found.verdict.word not in ("none", "parameters"):
+        found = judged_by_own_base(found)
     told = _told(found, begun, (refitted, values))
     if said := _said_of_runs(counted, found):
         told = replace(told, warnings=(*told.warnings, *said))
@@ -229,8 +232,11 @@ def _found(
         found = find(
             standing, singles, runs.run_tasks, on_round, given_sse, may_cut=False
         )
+        found = with_own_base(found, standing, runs.simulator)
         some = runs.up_to(_FOR_SINGLES)
-        alone = single_in_simulation(found, some, values, on_round)
+        alone = single_in_simulation(
+            found, some, values, on_round, may_pair=options.max_effects > 1
+        )
         if alone.findings is not None and alone.is_all:
             return alone.findings, alone.values, True
         if is_first and have_moved(values, alone.values, _MOVED):
@@ -288,6 +294,7 @@ def _of_sets(
     found = find(
         standing, options, runs.run_tasks, on_round, given_sse, may_cut=one is None
     )
+    found = with_own_base(found, standing, runs.simulator)
     on_round("the effect in the simulation", 0)
     several = confirm(found, runs, values)
     if alone is None:

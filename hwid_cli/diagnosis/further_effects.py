@@ -42,6 +42,8 @@ def with_further_effect(
     if runs.run_tasks.are_spent:
         return first
     chosen = one.verdict.chosen
+    if len(chosen.effects) > 1:
+        return first
     (known,) = chosen.effects
     if any(each.is_own for each in CATALOGUE[known].parameters):
         # What each recording has for itself is no effect that a simulation may have.

@@ -1,18 +1,25 @@
 """Effects at the ports of a simulation, on its input or its output, fitted through its runs.
 
-They need no loop: a run with the changed input is exact, and so is a reading of a run.
+They need no loop: a run with the changed input is exact, and so is a reading of a run, of
+one effect or of several.
 Parameters of the simulation that have imitated a delay leave a second minimum, which no turn
 leaves; so effect and parameters are fitted together, from the parameters as stated too.
 docs/method_diagnosis.md, eq. (D32c).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import rebuilt, with_values, without_base
+from hwid_cli.diagnosis.candidate import (
+    rebuilt,
+    with_values,
+    without_base,
+    without_owner,
+)
 from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.own_base import gap_without
 from hwid_cli.diagnosis.own_parameters import cost_of, fit_beside
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import Signals
@@ -21,6 +28,7 @@ from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import changes_input, moved_as
 from hwid_cli.diagnosis.turns import Turn, best_turn, forces_along, held, pushed
 from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.output import read
 from hwid_cli.drive.simulation import parameter_vector
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
@@ -32,41 +40,63 @@ _FEW = 2
 
 @dataclass(frozen=True, eq=False)
 class PortStart:
-    """An effect at a port as a few recordings tell it, to go on from.
+    """Effects at the ports as a few recordings tell them, to go on from.
 
     Parameters
     ----------
     fit : CandidateFit
-        Of the effect to the stand-in.
+        Of the effects to the stand-in.
     values : dict of str to float
-        Of the simulation's parameters and of the effect's.
+        Of the simulation's parameters and of the effects'.
     left : float, [-]
         Mean square that it leaves of these recordings, over that of the noise.
+    share : float, [-]
+        Of what the simulation leaves of these recordings without it.
     """
 
     fit: CandidateFit
     values: dict[str, float]
     left: float
+    share: float
+
+    @property
+    def of_effects(self) -> dict[str, dict[str, float]]:
+        """Parameters of each effect."""
+        found: dict[str, dict[str, float]] = {one: {} for one in self.fit.effects}
+        for ref in self.fit.names:
+            if ref.owner in found:
+                found[ref.owner][ref.parameter] = self.values[str(ref)]
+        return found
+
+    @property
+    def of_simulation(self) -> dict[str, float]:
+        """Parameters of the simulation."""
+        of_effects = {str(ref) for ref in self.fit.names}
+        return {k: one for k, one in self.values.items() if k not in of_effects}
 
 
-def port_effect(
-    findings: Findings, effect: str, values: Mapping[str, float]
+def port_effects(
+    findings: Findings, values: Mapping[str, Mapping[str, float]]
 ) -> CandidateFit:
-    """An effect at a port alone, with values to start from.
+    """Effects at the ports alone, with values to start from.
 
     Parameters
     ----------
-    effect : str
-        Id of the entry.
-    values : mapping of str to float
-        Of its parameters, by their names.
+    values : mapping of str to mapping of str to float
+        Of the parameters of each effect, by their names.
     """
     base = without_base(findings.base)
+    effects = tuple(sorted(values))
+    each = {
+        ParameterRef(effect, name): value
+        for effect in effects
+        for name, value in values[effect].items()
+    }
     return replace(
         base,
-        effects=(effect,),
-        names=(*base.names, *(ParameterRef(effect, name) for name in values)),
-        values=np.r_[base.values, list(values.values())],
+        effects=effects,
+        names=(*base.names, *each),
+        values=np.r_[base.values, list(each.values())],
         valleys=np.zeros((0, 0)),
     )
 
@@ -74,39 +104,43 @@ def port_effect(
 def begin_at_port(
     findings: Findings, fit: CandidateFit, runs: Runs, values: dict[str, float]
 ) -> PortStart | None:
-    """Fit an effect at a port and the parameters to the recordings that move most.
+    """Fit effects at the ports and the parameters to the recordings that move most.
 
-    A hopeless one is known by then, for a part of the runs.
+    Hopeless ones are known by then, for a part of the runs.
 
     Parameters
     ----------
     fit : CandidateFit
-        Of one effect at a port to the stand-in.
+        Of effects at the ports to the stand-in.
     values : dict of str to float
-        Parameters of the simulation as they were fitted without it.
+        Parameters of the simulation as they were fitted without the effect that is new,
+        and values of those that are not.
 
     Returns
     -------
     PortStart or None
         None where the simulation gives no answer, or leaves more than without the effect.
     """
-    search = _Search(findings, without_base(fit), runs)
+    search = PortSearch(findings, without_base(fit), runs)
     best = search.best_of(search.starts(values))
     if best is None:
         return None
     few = moving_most(findings.problem.signals)
-    without = _by_name(findings, findings.base.sse)
+    without = _by_name(findings, gap_without(findings))
     found = fit_beside(search.ask, few, search.free, best, without)
     if found is None:
         return None
     noise = _by_name(findings, findings.criteria.floors)
-    squares = sum(noise[one.name] for one in few)
-    left = cost_of(search.ask, few, found) / squares if squares else np.inf
-    return PortStart(fit, found, left)
+    left = cost_of(search.ask, few, found)
+    of_noise, of_gap = (
+        left / squares if (squares := sum(each[one.name] for one in few)) else np.inf
+        for each in (noise, without)
+    )
+    return PortStart(fit, found, of_noise, of_gap)
 
 
-def with_port_effect(findings: Findings, start: PortStart, runs: Runs) -> Turn | None:
-    """Best run with an effect at a port, fitted together with the parameters.
+def with_port_effects(findings: Findings, start: PortStart, runs: Runs) -> Turn | None:
+    """Best run with effects at the ports, fitted together with the parameters.
 
     Returns
     -------
@@ -114,15 +148,15 @@ def with_port_effect(findings: Findings, start: PortStart, runs: Runs) -> Turn |
         None where the simulation gives no answer, or what it leaves is not less than
         without the effect.
     """
-    search = _Search(findings, without_base(start.fit), runs)
+    search = PortSearch(findings, without_base(start.fit), runs)
     signals = findings.problem.signals
-    without = _by_name(findings, findings.base.sse)
+    without = _by_name(findings, gap_without(findings))
     found = fit_beside(search.ask, signals, search.free, start.values, without)
     begun = None if found is None else search.begun(found)
     turn = None if begun is None else best_turn(findings, begun, runs)
     if turn is None or turn.tried is None:
         return None
-    return None if turn.sse.sum() >= findings.base.sse.sum() else turn
+    return None if turn.sse.sum() >= gap_without(findings).sum() else turn
 
 
 def moving_most(signals: Sequence[Signals]) -> list[Signals]:
@@ -143,71 +177,63 @@ def _by_name(findings: Findings, each: np.ndarray) -> dict[str, float]:
     return dict(zip(names, each.tolist(), strict=True))
 
 
-def run_with_port_effect(
-    findings: Findings,
-    fit: CandidateFit,
-    runs: Runs,
-    plain: tuple[Sequence[Signals], Sequence[SimulatorRun]],
-    values: dict[str, float],
-) -> list[SimulatorRun] | None:
-    """Run the simulation on some recordings with an effect on its input or its output.
-
-    Parameters
-    ----------
-    plain : tuple of sequences of Signals and SimulatorRun
-        The recordings, and runs without the effect, which another reading is made of.
-    values : dict of str to float
-        Parameters of the simulation.
-    """
-    search = _Search(findings, without_base(fit), runs)
-    signals, found = plain
-    both = {**values, **search.of_effect}
-    if changes_input(fit.effects):
-        return search.ask(signals, both)
-    return search.read(signals, found, both)
-
-
-class _Search:
-    """An effect at a port and the simulation's parameters as one set of values.
+class PortSearch:
+    """Effects at the ports and the simulation's parameters as one set of values.
 
     Parameters
     ----------
     fit : CandidateFit
-        Of the effect alone.
+        Of the effects alone; without any, of the simulation itself.
     """
 
     def __init__(self, findings: Findings, fit: CandidateFit, runs: Runs) -> None:
-        self._findings, self._fit, self._runs = findings, fit, runs
+        self.findings, self._fit, self._runs = findings, fit, runs
         self._problem = held(findings.problem)
-        (self._effect,) = fit.effects
+        of_input = [one for one in fit.effects if changes_input((one,))]
+        self._at_output = [one for one in fit.effects if one not in of_input]
+        self._on_input = fit
+        for one in self._at_output:
+            self._on_input = without_owner(self._on_input, one)
         fitted = dict(zip(fit.names, fit.values.tolist(), strict=True))
-        self.of_effect = {
-            str(ref): value
-            for ref, value in fitted.items()
-            if ref.owner == self._effect
+        self.of_effects = {
+            str(ref): value for ref, value in fitted.items() if ref.owner in fit.effects
         }
+
+    def of(self, fit: CandidateFit) -> "PortSearch":
+        """The same for other effects."""
+        return PortSearch(self.findings, without_base(fit), self._runs)
+
+    def changes_input_as(self, other: "PortSearch") -> bool:
+        """Whether both change the input alike, as long as values are the same."""
+        return self._on_input.effects == other._on_input.effects
 
     @property
     def free(self) -> dict[str, FreeParameter]:
-        """Parameters of the simulation and of the effect, with their bounds."""
-        scales = self._findings.scales
-        bounds = {
-            name: CATALOGUE[self._effect].parameter(_name(name)).bounds(scales)
-            for name in self.of_effect
+        """Parameters of the simulation and of the effects, with their bounds."""
+        refs = {key: ParameterRef.of_text(key) for key in self.of_effects}
+        effects = {
+            key: FreeParameter(
+                self.of_effects[key],
+                CATALOGUE[ref.owner].parameter(ref.parameter).bounds(self._scales),
+            )
+            for key, ref in refs.items()
         }
-        effect = {
-            name: FreeParameter(value, bounds[name])
-            for name, value in self.of_effect.items()
-        }
-        return {**self._runs.simulator.free, **effect}
+        return {**self._runs.simulator.free, **effects}
+
+    @property
+    def _scales(self) -> Scales:
+        return self.findings.scales
 
     def starts(self, values: Mapping[str, float]) -> list[dict[str, float]]:
-        """Where to begin: parameters as fitted and as stated, effects as found and of any size."""
-        effect = CATALOGUE[self._effect].starts(self._findings.scales)
-        names = self.of_effect
-        sizes = [{name: one[_name(name)] for name in names} for one in effect]
-        stated = self._runs.simulator.values
-        return [{**of, **size} for of in (values, stated) for size in (names, *sizes)]
+        """Where to begin: parameters as fitted and as stated, a new effect of any size."""
+        new = {k: one for k, one in self.of_effects.items() if k not in values}
+        sizes = [new]
+        for effect in {ParameterRef.of_text(key).owner for key in new}:
+            of = {key: _name(key) for key in new}
+            starts = CATALOGUE[effect].starts(self._scales)
+            sizes += [{key: one[name] for key, name in of.items()} for one in starts]
+        stated = {**values, **self._runs.simulator.values}
+        return [{**of, **size} for of in (values, stated) for size in sizes]
 
     def best_of(self, starts: Sequence[dict[str, float]]) -> dict[str, float] | None:
         """The start that leaves least of the training recording that moves most."""
@@ -220,17 +246,24 @@ class _Search:
     def ask(
         self, signals: Sequence[Signals], values: Mapping[str, float]
     ) -> list[SimulatorRun] | None:
-        """Run the simulation with its input, or its output, as the effect changes it."""
-        if not changes_input((self._effect,)):
-            found = self._runs.tried(signals, self._of_simulation(values))
-            return None if found is None else self.read(signals, found, values)
+        """Run the simulation with its input and its output as the effects change them."""
+        found = self.run(signals, values)
+        return None if found is None else self.read(signals, found, values)
+
+    def run(
+        self, signals: Sequence[Signals], values: Mapping[str, float]
+    ) -> list[SimulatorRun] | None:
+        """Run the simulation with its input as the effects change it."""
+        own = self._of_simulation(values)
+        if not self._on_input.effects:
+            return self._runs.tried(signals, own)
         forces = self._forces(values)
         if forces is None:
             return None
         rows = {one.name: row for row, one in enumerate(self._problem.signals)}
         chosen = [forces[rows[one.name]] for one in signals]
         some = replace(self._problem, signals=tuple(signals))
-        return pushed(self._runs, some, chosen, False, self._of_simulation(values))
+        return pushed(self._runs, some, chosen, False, own)
 
     def read(
         self,
@@ -238,9 +271,15 @@ class _Search:
         found: Sequence[SimulatorRun],
         values: Mapping[str, float],
     ) -> list[SimulatorRun]:
-        """What a sensor with the effect shows of runs."""
-        of_effect = {_name(key): values[key] for key in self.of_effect}
-        vector = parameter_vector(self._problem.drive, {self._effect: of_effect})
+        """What a sensor with the effects shows of runs."""
+        if not self._at_output:
+            return list(found)
+        of_output: dict[str, dict[str, float]] = {one: {} for one in self._at_output}
+        for key in self.of_effects:
+            ref = ParameterRef.of_text(key)
+            if ref.owner in of_output:
+                of_output[ref.owner][ref.parameter] = values[key]
+        vector = parameter_vector(self._problem.drive, of_output)
         read_runs = []
         for one, run in zip(signals, found, strict=True):
             moved, step = moved_as(one, run), one.sample_time_s
@@ -254,21 +293,24 @@ class _Search:
         if forces is None:
             return None
         said = float(self._fit.sse.sum())
-        fit = with_values(self._fit, _by_ref(values, self.of_effect))
+        fit = with_values(self._fit, _by_ref(values, self.of_effects))
         own = self._of_simulation(values)
         turn = Turn(self._problem, fit, own, said, at_force=False)
         return begun_with(turn, self._runs, own, forces)
 
     def _forces(self, values: Mapping[str, float]) -> list[np.ndarray] | None:
-        if not changes_input((self._effect,)):
+        fit = self._on_input
+        if not fit.effects:
             return [np.zeros(one.driven_by.size) for one in self._problem.signals]
-        fit = with_values(self._fit, _by_ref(values, self.of_effect))
-        point = rebuilt(self._problem, fit, self._findings.scales)
+        refs = {str(ref) for ref in fit.names}
+        of_input = [key for key in self.of_effects if key in refs]
+        fit = with_values(fit, _by_ref(values, of_input))
+        point = rebuilt(self._problem, fit, self._scales)
         forces = forces_along(self._problem, simulate_at(self._problem, *point))
         return forces if all(np.isfinite(one).all() for one in forces) else None
 
     def _of_simulation(self, values: Mapping[str, float]) -> dict[str, float]:
-        return {k: v for k, v in values.items() if k not in self.of_effect}
+        return {k: v for k, v in values.items() if k not in self.of_effects}
 
 
 def _name(key: str) -> str:
@@ -276,6 +318,6 @@ def _name(key: str) -> str:
 
 
 def _by_ref(
-    values: Mapping[str, float], keys: Mapping[str, float]
+    values: Mapping[str, float], keys: Iterable[str]
 ) -> dict[ParameterRef, float]:
     return {ParameterRef.of_text(key): values[key] for key in keys}

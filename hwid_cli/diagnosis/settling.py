@@ -12,6 +12,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate import fitted_drive, rebuilt, without_base
 from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.own_base import gap_without
 from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import Signals
@@ -59,7 +60,7 @@ def settled(
     said = float(fit.sse.sum())
     turn = Turn(findings.problem, fit, values, said, at_force, rival=rival)
     best = _best_of(findings, turn, runs)
-    without = float(findings.base.sse.sum())
+    without = float(gap_without(findings).sum())
     if (
         fit.effects
         and has_force

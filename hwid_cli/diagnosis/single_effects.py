@@ -13,11 +13,12 @@ import numpy as np
 from hwid_cli.diagnosis.candidate import fitted_effects
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
+from hwid_cli.diagnosis.own_base import is_beyond_factors, judged_by_own_base
 from hwid_cli.diagnosis.port_effects import (
     PortStart,
     begin_at_port,
-    port_effect,
-    with_port_effect,
+    port_effects,
+    with_port_effects,
 )
 from hwid_cli.diagnosis.port_screening import AtPorts, screened_at_ports
 from hwid_cli.diagnosis.selection import (
@@ -50,7 +51,11 @@ _LEAST_LEFT = 0.01
 _MOST_ON_INPUT = 3
 _CLEARLY_LESS = 0.5
 # Effects at its ports that the simulation's runs alone call likely: so many are fitted.
-_MOST_BY_RUNS = 2
+# Those that leave more than three times the noise, this share of the gap, and so many
+# times what the stand-in says of another effect wait until that has been tried, [-].
+_MOST_BY_RUNS, _MOST_OF_GAP, _WORTH_WAITING = 2, 0.25, 2.0
+# Mean square over the noise's beside which no further one is begun.
+_NEXT_TO_NOISE = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +82,12 @@ class ToldByRuns:
 
 
 def single_in_simulation(
-    findings: Findings, runs: Runs, values: dict[str, float], on_round: OnRound
+    findings: Findings,
+    runs: Runs,
+    values: dict[str, float],
+    on_round: OnRound,
+    *,
+    may_pair: bool = False,
 ) -> ToldByRuns:
     """Put the likely single effects into the simulation, and let its runs decide.
 
@@ -88,6 +98,8 @@ def single_in_simulation(
     ----------
     findings : Findings
         Of single effects.
+    may_pair : bool
+        Whether two effects at the ports, which runs alone tell, may be tried together.
     """
     if not findings.base.is_usable:
         return ToldByRuns(None, values, is_all=False)
@@ -98,7 +110,8 @@ def single_in_simulation(
     likely = _likely(findings)
     criteria, base = findings.criteria, findings.base
     if not any(criteria.is_nearly_all(one, base) for one in likely):
-        tried.keep(_at_ports_by_runs_alone(tried, runs, values))
+        found = _at_ports_by_runs_alone(tried, runs, values, may_pair=may_pair)
+        tried.keep(found)
     _try_likely(tried, likely, runs, values, on_round)
     tried.keep(_at_ports_later(tried, runs))
     tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
@@ -130,6 +143,7 @@ class _Tried:
         return any(
             criteria.is_complete(fit) and self.at_ports.is_behind(effect, *fit.effects)
             for fit in self.fits.values()
+            if len(fit.effects) == 1
         )
 
     def are_nearly_all(self, turns: Sequence[Turn]) -> bool:
@@ -137,6 +151,11 @@ class _Tried:
         criteria, base = self.findings.criteria, self.findings.base
         fits = [fit_of_run(self.findings, turn) for turn in turns]
         return any(criteria.is_nearly_all(fit, base) for fit in fits)
+
+    def is_far_from_all(self, start: PortStart) -> bool:
+        """Whether a start leaves much, and another effect leaves nothing."""
+        far = start.left > STILL_LARGE**2
+        return far and self.are_nearly_all(list(self.turns.values()))
 
     def keep(self, turns: Sequence[Turn]) -> None:
         """Keep runs that leave less than those before with the same effect."""
@@ -179,7 +198,8 @@ def _in_simulation(
         tried.through_runs.add(one.effects)
         waiting = (each for each in tried.later if each.fit.effects == one.effects)
         start = next(waiting, None) or begin_at_port(findings, one, runs, values)
-        found = [] if start is None else _through_runs(tried, start, runs)
+        if start is not None and not tried.is_far_from_all(start):
+            found = _through_runs(tried, start, runs)
         if tried.are_nearly_all(found) or runs.run_tasks.are_spent:
             return found
     rival = min((fit.sse.sum() for fit in tried.fits.values()), default=np.inf)
@@ -201,7 +221,7 @@ def _twins_in_simulation(
     done = [
         effects
         for effects, fit in fits.items()
-        if findings.criteria.is_nearly_all(fit, findings.base)
+        if len(effects) == 1 and findings.criteria.is_nearly_all(fit, findings.base)
     ]
     found = []
     for effects in done:
@@ -213,7 +233,7 @@ def _twins_in_simulation(
 
 
 def _at_ports_by_runs_alone(
-    tried: _Tried, runs: Runs, values: dict[str, float]
+    tried: _Tried, runs: Runs, values: dict[str, float], *, may_pair: bool
 ) -> list[Turn]:
     """Effects at the ports that the simulation calls likely, whatever its stand-in says.
 
@@ -223,20 +243,68 @@ def _at_ports_by_runs_alone(
     if runs.run_tasks.are_spent:
         return found
     tried.at_ports = screened_at_ports(tried.findings, runs, values)
-    starts: list[PortStart] = []
-    for one in tried.at_ports.likely[:_MOST_BY_RUNS]:
-        if runs.run_tasks.are_spent:
-            break
-        begun = begin_at_port(tried.findings, one, runs, values)
-        starts += [] if begun is None else [begun]
-    for start in sorted(starts, key=lambda one: one.left):
+    said = _least_said(tried.findings)
+    for start in _begun_at_ports(tried, tried.at_ports, runs):
         if tried.are_nearly_all(found) or runs.run_tasks.are_spent:
             break
-        if start.left > STILL_LARGE**2:
+        is_large = start.left > STILL_LARGE**2
+        waits = is_large and start.left > _WORTH_WAITING * said
+        if is_large and not waits and may_pair:
+            found += _pair_at_ports(tried, start, runs)
+            if tried.are_nearly_all(found):
+                break
+        if waits and start.share > _MOST_OF_GAP:
             tried.later.append(start)
             continue
         found += _through_runs(tried, start, runs)
     return [*found, *_with_wider_law(tried, found, runs)]
+
+
+def _begun_at_ports(tried: _Tried, at_ports: AtPorts, runs: Runs) -> list[PortStart]:
+    """Likely effects fitted to a few recordings, those that leave least first."""
+    starts: list[PortStart] = []
+    for one in at_ports.likely[:_MOST_BY_RUNS]:
+        if runs.run_tasks.are_spent:
+            break
+        begun = begin_at_port(tried.findings, one.fit, runs, one.values)
+        starts += [] if begun is None else [begun]
+        if begun is not None and begun.left <= _NEXT_TO_NOISE:
+            break
+    return sorted(starts, key=lambda one: one.left)
+
+
+def _least_said(findings: Findings) -> float:
+    """Mean square that the stand-in leaves at best of all recordings, over the noise's."""
+    squares = [float(one.sse.sum()) for one in findings.found.fits.values()
+               if one.is_usable]  # fmt: skip
+    floor = float(findings.criteria.floors.sum())
+    return min(squares, default=0.0) / floor if floor > 0 else 0.0
+
+
+def _pair_at_ports(tried: _Tried, first: PortStart, runs: Runs) -> list[Turn]:
+    """Best run with a second effect at a port, beside one that takes much and leaves much.
+
+    A dead zone and a delay are each small beside what the other one leaves.
+    """
+    findings = tried.findings
+    known = first.of_effects
+    screened = screened_at_ports(findings, runs, first.of_simulation, known)
+    for start in _begun_at_ports(tried, screened, runs):
+        if start.left > _MOST_OF_GAP * first.left:
+            break
+        if runs.run_tasks.are_spent and start.left > _NEXT_TO_NOISE:
+            break
+        found = _through_runs(tried, start, runs)
+        if not tried.are_nearly_all(found) or runs.run_tasks.are_spent:
+            return found
+        # The second one alone may be all of it.
+        (second,) = set(start.fit.effects) - set(known)
+        fit = port_effects(findings, {second: start.of_effects[second]})
+        alone = begin_at_port(findings, fit, runs, start.of_simulation)
+        if alone is not None and alone.left <= STILL_LARGE**2:
+            found += _through_runs(tried, alone, runs)
+        return found
+    return []
 
 
 def _at_ports_later(tried: _Tried, runs: Runs) -> list[Turn]:
@@ -258,7 +326,10 @@ def _with_wider_law(tried: _Tried, turns: Sequence[Turn], runs: Runs) -> list[Tu
     others that leave no less would be as likely.
     """
     findings = tried.findings
-    if not turns or tried.are_nearly_all(turns) or runs.run_tasks.are_spent:
+    if tried.are_nearly_all(turns) or runs.run_tasks.are_spent:
+        return []
+    turns = [one for one in turns if len(one.fit.effects) == 1]
+    if not turns:
         return []
     best = min(turns, key=lambda turn: float(turn.sse.sum()))
     fit = fit_of_run(findings, best)
@@ -273,7 +344,7 @@ def _with_wider_law(tried: _Tried, turns: Sequence[Turn], runs: Runs) -> list[Tu
     if wide is None:
         return []
     values = CATALOGUE[wide].starts(findings.scales)[0] | fitted_effects(fit)[effect]
-    of_wide = port_effect(findings, wide, values)
+    of_wide = port_effects(findings, {wide: values})
     start = begin_at_port(findings, of_wide, runs, best.values_of_run)
     return [] if start is None else _through_runs(tried, start, runs)
 
@@ -281,7 +352,7 @@ def _with_wider_law(tried: _Tried, turns: Sequence[Turn], runs: Runs) -> list[Tu
 def _through_runs(tried: _Tried, start: PortStart, runs: Runs) -> list[Turn]:
     """Best run with an effect at a port, fitted through runs; none where it leaves more."""
     tried.through_runs.add(start.fit.effects)
-    turn = with_port_effect(tried.findings, start, runs)
+    turn = with_port_effects(tried.findings, start, runs)
     return [] if turn is None else [turn]
 
 
@@ -474,17 +545,23 @@ def decided_by_runs(
     dict of str to float
         Parameters of the simulation at that run.
     """
-    criteria, base = findings.criteria, findings.base
-    best = select_best(criteria, [fits[one] for one in tried], base)
-    if best is None:
+    criteria, rival = findings.criteria, findings
+    findings = judged_by_own_base(findings)
+    base, best = findings.base, list[CandidateFit]()
+    for size in sorted({len(one) for one in tried}):
+        same = [fits[one] for one in tried if len(one) == size]
+        one = select_best(criteria, same, base)
+        best += [] if one is None else [one]
+    if not best:
         return None
 
     def unclear(one: CandidateFit) -> tuple[str, ...]:
         problem = replace(tried[one.effects].problem, known={})
         return unclear_effects(problem, one, findings.scales)
 
-    verdict = decide(criteria, findings.given_sse, base, fits, (best,), unclear)
-    if verdict.chosen.effects not in tried:
+    verdict = decide(criteria, findings.given_sse, base, fits, best, unclear)
+    chosen = verdict.chosen
+    if chosen.effects not in tried or not is_beyond_factors(rival, chosen):
         return None
     turn = tried[verdict.chosen.effects]
     found = replace(findings.found, fits={**findings.found.fits, **fits})

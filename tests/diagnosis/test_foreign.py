@@ -559,7 +559,11 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
         }
         criteria = SimpleNamespace(**no)
         return SimpleNamespace(
-            verdict=verdict, criteria=criteria, base=None, is_confirmed=is_confirmed
+            verdict=verdict,
+            criteria=criteria,
+            base=None,
+            own_base=None,
+            is_confirmed=is_confirmed,
         )
 
     begun, results = [], iter(confirmed)
@@ -616,7 +620,8 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
     monkeypatch.setattr(foreign, "find", find)
     monkeypatch.setattr(foreign, "belongs_to", lambda *_: True)
     monkeypatch.setattr(foreign, "with_further_effect", lambda first, *_: first)
-    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_: alone)
+    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_, **__: alone)
+    monkeypatch.setattr(foreign, "with_own_base", lambda found, *_: found)
     monkeypatch.setattr(
         foreign, "confirm", lambda found, *_: (found, {"c": 1.0}, False)
     )
@@ -652,9 +657,10 @@ def test_other_sets_are_run_where_none_is_confirmed(
     several, lead = findings("set", effects), findings("lead", ("end_stop", "hum"))
     leads = ToldByRuns(lead if is_found else None, {"c": 2.0}, is_all=False)
     monkeypatch.setattr(foreign, "find", lambda *_, **__: several)
+    monkeypatch.setattr(foreign, "with_own_base", lambda found, *_: found)
     monkeypatch.setattr(foreign, "confirm", lambda *_: (several, {}, is_confirmed))
     monkeypatch.setattr(foreign, "leads_in_simulation", lambda *_: leads)
-    runs = SimpleNamespace(run_tasks=None)
+    runs = SimpleNamespace(run_tasks=None, simulator=None)
     alone = ToldByRuns(None, {}, is_all=False)
     found, values, borne_out = foreign._of_sets(
         None, DiagnoseOptions(), (runs, {}), lambda *_: None, None, alone
@@ -696,7 +702,8 @@ def test_sets_have_runs_beyond_those_of_single_effects_where_these_are_open(
     alone = ToldByRuns(None, {}, is_all=False)
     monkeypatch.setattr(foreign, "find", lambda *_, **__: found)
     monkeypatch.setattr(foreign, "with_further_effect", lambda first, *_: first)
-    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_: alone)
+    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_, **__: alone)
+    monkeypatch.setattr(foreign, "with_own_base", lambda found, *_: found)
     monkeypatch.setattr(foreign, "_with_runs", lambda one, *_: one)
     monkeypatch.setattr(foreign, "_of_sets", lambda *a: seen.append(a[2][0]))
     # All that may be left out are spent.

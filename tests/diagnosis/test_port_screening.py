@@ -52,11 +52,12 @@ def level(values, volts):
     return np.array(found)
 
 
-def pumped(volts, threshold):
-    return np.maximum(volts - threshold, 0.0)
+def pumped(volts, threshold, late=0):
+    before = np.r_[np.full(late, volts[0]), volts[: volts.size - late]]
+    return np.maximum(before - threshold, 0.0)
 
 
-def recordings(threshold):
+def recordings(threshold, late=0):
     rng = np.random.default_rng(4)
     time = STEP * np.arange(N)
     inputs = (
@@ -69,7 +70,7 @@ def recordings(threshold):
     return [
         Recording(
             f"run_{row}", one,
-            level(TRUE, pumped(one, threshold)) + NOISE * rng.standard_normal(N),
+            level(TRUE, pumped(one, threshold, late)) + NOISE * rng.standard_normal(N),
             STEP, kind="other", input_unit="V", output_unit="m",
         )
         for row, one in enumerate(inputs)
@@ -80,12 +81,12 @@ def simulate(request):
     return SimulatorRun(level(request.parameters, request.input), np.zeros(0))
 
 
-def diagnosed(threshold):
+def diagnosed(threshold, late=0, effects=LIKELY):
     able = Capabilities(run=True, parameters=True)
-    options = DiagnoseOptions(hold_out=("run_1",), effects=LIKELY, laws="never")
+    options = DiagnoseOptions(hold_out=("run_1",), effects=effects, laws="never")
     run = Count()
     found = diagnose_foreign(
-        recordings(threshold), Simulator(able, simulate, {}, FREE, GIVEN), options,
+        recordings(threshold, late), Simulator(able, simulate, {}, FREE, GIVEN), options,
         run, lambda what, n: None,
     )  # fmt: skip
     return found, run.runs
@@ -102,6 +103,20 @@ def test_a_dead_zone_is_told_by_runs_where_no_drive_can_stand_for_the_simulation
     assert threshold.value == pytest.approx(1.62, abs=0.03)
     assert found.base[0].after == pytest.approx(TRUE["gain"], rel=0.02)
     assert runs < 800
+
+
+@pytest.mark.thorough
+def test_two_effects_at_ports_are_told_together_where_neither_explains_enough():
+    late = 8
+    likely = (*LIKELY, "input_delay", "actuator_lag", "sensor_lag")
+    found, _ = diagnosed(1.62, late, likely)
+    assert (found.verdict, found.complete) == ("named", True)
+    values = {one.id: one.parameters[0].value for one in found.effects}
+    assert values == {
+        "input_dead_zone": pytest.approx(1.62, abs=0.03),
+        "input_delay": pytest.approx(late * STEP, abs=0.3 * STEP),
+    }
+    assert found.base[0].after == pytest.approx(TRUE["gain"], rel=0.02)
 
 
 @pytest.mark.thorough

@@ -48,7 +48,9 @@ def settle(monkeypatch):
         monkeypatch.setattr(settling, "_beside_effect", beside_effect)
         able = SimpleNamespace(force=True)
         simulator = SimpleNamespace(free={"c": None}, capabilities=able)
-        findings = SimpleNamespace(problem=problem(recordings()), base=base(1e5))
+        findings = SimpleNamespace(
+            problem=problem(recordings()), base=base(1e5), own_base=None
+        )
         fit = made_up((FRICTION,), 100.0 / 6)
         counted = SimpleNamespace(are_spent=spent)
         runs = SimpleNamespace(simulator=simulator, run_tasks=counted)

@@ -8,7 +8,7 @@ import pytest
 
 from hwid_cli.diagnosis import single_effects
 from hwid_cli.diagnosis.port_effects import PortStart
-from hwid_cli.diagnosis.port_screening import AtPorts
+from hwid_cli.diagnosis.port_screening import AtPorts, LikelyAtPort
 from hwid_cli.diagnosis.single_effects import (
     _is_settled_by,
     _likely,
@@ -60,12 +60,12 @@ def test_an_effect_at_a_port_is_fitted_through_runs_first(
     def by_turns(findings, one, runs, values, rival):
         turns.append(one.effects[0])
 
-    start = SimpleNamespace(fit=lag)
+    start = PortStart(lag, {}, 1.1, 0.1)
     monkeypatch.setattr(single_effects, "begin_at_port", lambda *_: start)
-    monkeypatch.setattr(single_effects, "with_port_effect", lambda *_: run)
+    monkeypatch.setattr(single_effects, "with_port_effects", lambda *_: run)
     monkeypatch.setattr(single_effects, "fit_of_run", lambda findings, turn: turn)
     monkeypatch.setattr(single_effects, "settled", by_turns)
-    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0))
+    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0), own_base=None)
     runs = SimpleNamespace(
         simulator=SimpleNamespace(free={"gain": None}),
         run_tasks=SimpleNamespace(are_spent=False),
@@ -80,7 +80,7 @@ def test_an_effect_at_a_port_is_fitted_through_runs_first(
 
 
 def test_an_effect_that_leaves_far_more_than_another_at_a_port_is_not_tried_beside_it():
-    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0))
+    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0), own_base=None)
     tried = single_effects._Tried(findings)
     tried.at_ports = AtPorts({"output_backlash": 0.15, "input_delay": 0.9})
     delay = made_up(("input_delay",), 100.0)
@@ -252,15 +252,18 @@ def tried_at_ports(monkeypatch, lefts, sses, shares=()):
     findings = SimpleNamespace(
         criteria=CRITERIA,
         base=base(900.0),
+        own_base=None,
         scales=SCALES,
-        found=SimpleNamespace(shares={(one,): 0.1 for one in shares}),
+        found=SimpleNamespace(shares={(one,): 0.1 for one in shares}, fits={}),
     )
     runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
-    likely = tuple(made_up((one,), 100.0) for one in list(lefts)[:2])
+    likely = tuple(
+        LikelyAtPort(0.3, made_up((one,), 100.0), {}) for one in list(lefts)[:2]
+    )
     fitted = []
 
     def begin(_findings, one, _runs, values):
-        return PortStart(one, values, lefts[one.effects[0]])
+        return PortStart(one, values, lefts[one.effects[0]], 0.5)
 
     def fit(_findings, start, _runs):
         (effect,) = start.fit.effects
@@ -276,10 +279,10 @@ def tried_at_ports(monkeypatch, lefts, sses, shares=()):
         single_effects, "screened_at_ports", lambda *_: AtPorts({}, likely)
     )
     monkeypatch.setattr(single_effects, "begin_at_port", begin)
-    monkeypatch.setattr(single_effects, "with_port_effect", fit)
+    monkeypatch.setattr(single_effects, "with_port_effects", fit)
     monkeypatch.setattr(single_effects, "fit_of_run", lambda _, turn: turn.fit)
     tried = single_effects._Tried(findings)
-    tried.keep(single_effects._at_ports_by_runs_alone(tried, runs, {}))
+    tried.keep(single_effects._at_ports_by_runs_alone(tried, runs, {}, may_pair=False))
     first = list(fitted)
     tried.keep(single_effects._at_ports_later(tried, runs))
     return first, fitted[len(first) :]
@@ -316,7 +319,76 @@ def test_what_the_simulation_was_not_run_with_is_not_told(monkeypatch):
     run, part = made_up(("end_stop", "gravity"), 300.0), made_up(("end_stop",), 500.0)
     verdict = SimpleNamespace(chosen=part)
     monkeypatch.setattr(single_effects, "decide", lambda *_: verdict)
-    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0), given_sse=None)
+    findings = SimpleNamespace(
+        criteria=CRITERIA, base=base(900.0), given_sse=None, own_base=None
+    )
     fits = {one.effects: one for one in (part, run)}
     turns = {run.effects: SimpleNamespace()}
     assert single_effects.decided_by_runs(findings, turns, fits) is None
+
+
+ZONE, DELAY = "input_dead_zone", "input_delay"
+
+
+@pytest.mark.parametrize(
+    ("said", "left_alone", "left_both", "left_of_second", "fitted"),
+    [
+        # A dead zone takes most and leaves much: with a delay beside it nothing is left ...
+        (60.0, 50.0, 1.0, 40.0, [(ZONE, DELAY)]),
+        # ... which may be all of it, alone ...
+        (60.0, 50.0, 1.0, 1.0, [(ZONE, DELAY), (DELAY,)]),
+        # ... or takes too little.
+        (60.0, 50.0, 30.0, 40.0, [(ZONE,)]),
+        # No second one where the first leaves nothing, or the stand-in knows a better one.
+        (60.0, 1.5, 1.0, 40.0, [(ZONE,)]),
+        (2.0, 50.0, 1.0, 40.0, []),
+    ],
+)
+def test_a_second_effect_at_a_port_is_tried_beside_the_first(
+    monkeypatch, said, left_alone, left_both, left_of_second, fitted
+):
+    lefts = {(ZONE,): left_alone, (ZONE, DELAY): left_both, (DELAY,): left_of_second}
+    values = {"gain": 2.0, f"{ZONE}/threshold_A": 1.0, f"{DELAY}/delay_s": 3.0}
+    stand_in = made_up(("gravity",), 100.0 * said)
+    findings = SimpleNamespace(
+        criteria=CRITERIA, base=base(1e4), own_base=None, scales=SCALES,
+        found=SimpleNamespace(shares={}, fits={("gravity",): stand_in}),
+    )  # fmt: skip
+    runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
+    done, beside = [], []
+
+    def of(effects):
+        owned = [ParameterRef.of_text(one) for one in values if "/" in one]
+        owned = tuple(one for one in owned if one.owner in effects)
+        return replace(made_up(effects, 1.0), names=owned, values=np.ones(len(owned)))
+
+    def screened(_findings, _runs, own, known=None):
+        beside.append(known)
+        effects = (ZONE, DELAY) if known else (ZONE,)
+        return AtPorts({}, (LikelyAtPort(0.3, of(effects), own),))
+
+    def fit(_findings, start, _runs):
+        done.append(start.fit.effects)
+        sse = 100.0 * start.left
+        run = made_up(start.fit.effects, sse, whiteness=0.5 if sse <= 100.0 else 9.0)
+        return SimpleNamespace(fit=run, sse=run.sse, values_of_run={})
+
+    monkeypatch.setattr(single_effects, "screened_at_ports", screened)
+    monkeypatch.setattr(single_effects, "with_port_effects", fit)
+    monkeypatch.setattr(single_effects, "fit_of_run", lambda _, turn: turn.fit)
+    monkeypatch.setattr(
+        single_effects, "port_effects", lambda _findings, each: of(tuple(each))
+    )
+    monkeypatch.setattr(
+        single_effects,
+        "begin_at_port",
+        lambda _f, one, _r, _v: PortStart(
+            of(one.effects), values, lefts[one.effects], 0.3
+        ),
+    )
+    tried = single_effects._Tried(findings)
+    single_effects._at_ports_by_runs_alone(tried, runs, {"gain": 2.0}, may_pair=True)
+    assert done == fitted
+    known = {ZONE: {"threshold_A": 1.0}}
+    assert beside == [None, known] if left_alone > 9.0 and said > 25.0 else [None]
+    assert [one.fit.effects for one in tried.later] == ([] if fitted else [(ZONE,)])
