@@ -200,8 +200,10 @@ class _Growth:
             part = first_parts(self.few, longer)
             there = self._fitted(part, [*kept, *self._beside(kept, len(kept))])
             now = self._over_noise(part, there)
+            # Where much is left, it rises whatever is done: smaller steps do no good.
+            may_help = min(before, now) <= NO_HOPE
             is_lost = now > MOST_RISE * max(before, 1.0)
-            if is_lost and growth > LEAST_GROWTH:
+            if is_lost and may_help and growth > LEAST_GROWTH:
                 growth = max(growth**0.5, LEAST_GROWTH)
                 continue
             if is_lost:
@@ -209,6 +211,7 @@ class _Growth:
                 there += self._fitted(part, self._beside(kept, 0))
                 now = self._over_noise(part, there)
             is_hopeless = n_lost > MOST_LOST or min(before, now) > NO_HOPE
+            growth = growth if may_help else MOST_GROWTH
             if longer < early and is_hopeless:
                 return []
             if n < early <= longer and not self._gains(part, now, standing):

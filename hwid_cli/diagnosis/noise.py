@@ -44,6 +44,8 @@ _ROUNDING = 1e-9
 # the other noise moves the reading over several steps, and the error of rounding is
 # noise like any other.
 _GRID_SHARE = 0.5
+# A reading that jumps between two values of a grid has at most this RMS, over their distance.
+_BESIDE_A_STEP = 0.5
 # Values that all differ lie on a grid where their distances are so many multiples of the
 # smallest one: of values on none already a few are not.
 _FEWEST_MULTIPLES = 5
@@ -76,9 +78,12 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
     is_limited = grid > 0 and step >= _GRID_SHARE * max(differences, step)
     repeats = _from_repeats(problem.signals, differences)
     may_move = problem.start == "estimated"
-    rest = None if is_limited or not rests else _from_rest(problem.signals, may_move)
+    rest = _from_rest(problem.signals, may_move) if rests else None
     # Below its grid a sensor shows nothing: a reading that stands still is no less noise.
     if rest is not None and rest.rms < step:
+        rest = None
+    # On its grid a reading at rest jumps between two values. Slow noise visits more.
+    if rest is not None and is_limited and not _is_beyond(rest, grid):
         rest = None
     if repeats is not None and repeats.rms >= step:
         found, method = repeats, "repeats"
@@ -102,6 +107,11 @@ def noise_floor(problem: DiagnosisProblem, *, rests: bool = True) -> NoiseFloor:
         float(found.rms), method, shown, found.is_coloured, found.whitening,
         sentence, 0.0 if problem.is_filtered else _input_rms(problem),
     )  # fmt: skip
+
+
+def _is_beyond(rest: "Stretch", grid: float) -> bool:
+    """Whether noise at rest is slow, and more than readings beside one step of a grid."""
+    return rest.is_coloured and rest.rms > _BESIDE_A_STEP * grid
 
 
 def noise_levels(problem: DiagnosisProblem, noise: NoiseFloor) -> np.ndarray:

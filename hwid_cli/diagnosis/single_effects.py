@@ -5,7 +5,7 @@ error as well: sets of effects would be found that make up for it.
 docs/method_diagnosis.md, eq. (D33).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -34,7 +34,7 @@ from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import acts_at_port, changes_input
 from hwid_cli.diagnosis.tasks import OnRound
-from hwid_cli.diagnosis.turns import Turn, fit_of_run
+from hwid_cli.diagnosis.turns import Turn, best_turn, fit_of_run
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit
@@ -54,8 +54,11 @@ _CLEARLY_LESS = 0.5
 # Those that leave more than three times the noise, this share of the gap, and so many
 # times what the stand-in says of another effect wait until that has been tried, [-].
 _MOST_BY_RUNS, _MOST_OF_GAP, _WORTH_WAITING = 2, 0.25, 2.0
-# Mean square over the noise's beside which no further one is begun.
-_NEXT_TO_NOISE = 2.0
+# A run that leaves little more than noise may turn on after the others have used up theirs.
+_TO_SETTLE = 1.5
+# Mean square over the noise's beside which no further one is begun, unless runs have called
+# it likely by nearly the same share.
+_NEXT_TO_NOISE, _ALIKE = 2.0, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +117,7 @@ def single_in_simulation(
         tried.keep(found)
     _try_likely(tried, likely, runs, values, on_round)
     tried.keep(_at_ports_later(tried, runs))
+    tried.keep(_turned_on(tried, runs))
     tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
     decided = decided_by_runs(findings, tried.turns, tried.fits)
     if decided is not None:
@@ -207,6 +211,23 @@ def _in_simulation(
     return found if turn is None else [*found, turn]
 
 
+def _turned_on(tried: _Tried, runs: Runs) -> list[Turn]:
+    """Further turns of the run that leaves least, where that is little more than noise.
+
+    Its turns may have ended before they had settled; what it leaves then makes a law look
+    no better than its limit case.
+    """
+    turns, criteria = list(tried.turns.values()), tried.findings.criteria
+    if not turns:
+        return []
+    best = min(turns, key=lambda turn: float(turn.sse.sum()))
+    fit = fit_of_run(tried.findings, best)
+    if criteria.leaves_noise(fit) or criteria.ratio(fit) > STILL_LARGE:
+        return []
+    further = best_turn(tried.findings, best, runs.up_to(_TO_SETTLE))
+    return [further] if further.sse.sum() < best.sse.sum() else []
+
+
 def _twins_in_simulation(
     findings: Findings,
     runs: Runs,
@@ -263,13 +284,15 @@ def _at_ports_by_runs_alone(
 def _begun_at_ports(tried: _Tried, at_ports: AtPorts, runs: Runs) -> list[PortStart]:
     """Likely effects fitted to a few recordings, those that leave least first."""
     starts: list[PortStart] = []
-    for one in at_ports.likely[:_MOST_BY_RUNS]:
+    likely = at_ports.likely[:_MOST_BY_RUNS]
+    for one in likely:
+        are_clear = any(start.left <= _NEXT_TO_NOISE for start in starts)
         if runs.run_tasks.are_spent:
+            break
+        if are_clear and one.share > _ALIKE * likely[0].share:
             break
         begun = begin_at_port(tried.findings, one.fit, runs, one.values)
         starts += [] if begun is None else [begun]
-        if begun is not None and begun.left <= _NEXT_TO_NOISE:
-            break
     return sorted(starts, key=lambda one: one.left)
 
 
@@ -289,22 +312,30 @@ def _pair_at_ports(tried: _Tried, first: PortStart, runs: Runs) -> list[Turn]:
     findings = tried.findings
     known = first.of_effects
     screened = screened_at_ports(findings, runs, first.of_simulation, known)
-    for start in _begun_at_ports(tried, screened, runs):
-        if start.left > _MOST_OF_GAP * first.left:
+    found: list[Turn] = []
+    begun = _begun_at_ports(tried, screened, runs)
+    for start in begun:
+        is_clear = start.left <= _NEXT_TO_NOISE
+        is_behind = bool(found) and start.left > WITHIN_REACH * begun[0].left
+        is_spent = runs.run_tasks.are_spent and not is_clear
+        if start.left > _MOST_OF_GAP * first.left or is_behind or is_spent:
             break
-        if runs.run_tasks.are_spent and start.left > _NEXT_TO_NOISE:
-            break
-        found = _through_runs(tried, start, runs)
-        if not tried.are_nearly_all(found) or runs.run_tasks.are_spent:
-            return found
-        # The second one alone may be all of it.
-        (second,) = set(start.fit.effects) - set(known)
-        fit = port_effects(findings, {second: start.of_effects[second]})
-        alone = begin_at_port(findings, fit, runs, start.of_simulation)
-        if alone is not None and alone.left <= STILL_LARGE**2:
-            found += _through_runs(tried, alone, runs)
-        return found
-    return []
+        found += _through_runs(tried, start, runs)
+    if tried.are_nearly_all(found) and not runs.run_tasks.are_spent:
+        found += _second_alone(tried, begun[0], set(known), runs)
+    return found
+
+
+def _second_alone(
+    tried: _Tried, both: PortStart, first: Collection[str], runs: Runs
+) -> list[Turn]:
+    """Best run with the second effect of two alone, which may be all that is missing."""
+    (second,) = set(both.fit.effects) - set(first)
+    fit = port_effects(tried.findings, {second: both.of_effects[second]})
+    alone = begin_at_port(tried.findings, fit, runs, both.of_simulation)
+    if alone is None or alone.left > STILL_LARGE**2:
+        return []
+    return _through_runs(tried, alone, runs)
 
 
 def _at_ports_later(tried: _Tried, runs: Runs) -> list[Turn]:
@@ -417,8 +448,11 @@ def _base_in_simulation(
 
 
 def _likely(findings: Findings) -> list[CandidateFit]:
-    """Single effects that leave least beside the stand-in, limit cases and simple ones first."""
-    criteria = findings.criteria
+    """Single effects that leave least beside the stand-in, limit cases and simple ones first.
+
+    What leaves nothing there comes before: others then need few turns to be far behind.
+    """
+    criteria, base = findings.criteria, findings.base
     # What changes the input alone is put into the simulation, not into its stand-in: it
     # may have taken the stand-in's base anywhere.
     usable = [one for one in findings.found.fits.values()
@@ -436,9 +470,12 @@ def _likely(findings: Findings) -> list[CandidateFit]:
     # What leaves little more with fewer parameters may be all of it.
     limits = [one for one in near if one not in first
               and any(is_part_of(one, wide) for wide in first)]  # fmt: skip
-    return sorted(
-        [*first, *limits], key=lambda one: (-_n_including(one, near), count(one))
-    )
+
+    def order(one: CandidateFit) -> tuple[bool, int, int]:
+        is_all = criteria.is_nearly_all(one, base)
+        return not is_all, -_n_including(one, near), count(one)
+
+    return sorted([*first, *limits], key=order)
 
 
 def _on_the_input(

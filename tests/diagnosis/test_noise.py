@@ -453,3 +453,29 @@ def test_slow_noise_of_few_rests_hardly_ever_passes_for_a_common_motion():
         taken += _without_common_motion(slow) is not slow
     # By their RMS alone it is one of twenty.
     assert taken <= 7
+
+
+def on_a_grid(outputs, step):
+    return [step * np.round(one / step) for one in outputs]
+
+
+def test_slow_noise_on_a_coarse_grid_is_read_from_the_rest(motions, driven_by):
+    """A resolver that wanders, read by an encoder: the grid is the smaller part."""
+    rng = np.random.default_rng(5)
+    step = 0.02 * FULL_SCALE
+    noisy = [y + slow_noise(rng, y.size, 1.2 * step) for y in motions]
+    noise = noise_floor(problem_of(on_a_grid(noisy, step), driven_by))
+    assert (noise.method, noise.is_coloured) == ("rest", True)
+    assert noise.rms == pytest.approx(1.2 * step, rel=0.2)
+    assert noise.resolution == pytest.approx(step)
+
+
+def test_a_reading_that_jumps_between_two_values_at_rest_shows_its_grid_alone(
+    motions, driven_by
+):
+    """Slow noise far below the step looks slow and large where it crosses one."""
+    rng = np.random.default_rng(6)
+    step = 0.02 * FULL_SCALE
+    noisy = [0.5 * step + y + slow_noise(rng, y.size, 0.1 * step) for y in motions]
+    noise = noise_floor(problem_of(on_a_grid(noisy, step), driven_by))
+    assert noise.rms == pytest.approx(step / np.sqrt(12), rel=0.2)

@@ -392,3 +392,69 @@ def test_a_second_effect_at_a_port_is_tried_beside_the_first(
     known = {ZONE: {"threshold_A": 1.0}}
     assert beside == [None, known] if left_alone > 9.0 and said > 25.0 else [None]
     assert [one.fit.effects for one in tried.later] == ([] if fitted else [(ZONE,)])
+
+
+def test_what_leaves_nothing_beside_the_stand_in_is_run_before_its_limit_case():
+    fits = {
+        (one,): made_up((one,), sse, parameters=count)
+        for one, sse, count in (
+            ("coulomb_friction", 130.0, 1),
+            ("stribeck_friction", 100.05, 3),
+            ("asymmetric_friction", 120.0, 2),
+        )
+    }
+    findings = SimpleNamespace(
+        criteria=CRITERIA, base=base(1100.0), found=SimpleNamespace(fits=fits)
+    )
+    found = [one.effects[0] for one in _likely(findings)]
+    assert found[:2] == ["stribeck_friction", "coulomb_friction"]
+
+
+@pytest.mark.parametrize(
+    ("share", "begun"),
+    [
+        # One that leaves next to nothing is enough, unless another is as likely.
+        (0.9, ["input_delay"]),
+        (0.15, ["input_delay", "sensor_lag"]),
+    ],
+)
+def test_a_second_likely_effect_is_begun_beside_one_that_leaves_nothing(
+    monkeypatch, share, begun
+):
+    asked = []
+
+    def begin(_findings, one, _runs, values):
+        asked.append(one.effects[0])
+        return PortStart(one, values, 1.0, 0.1)
+
+    monkeypatch.setattr(single_effects, "begin_at_port", begin)
+    likely = (
+        LikelyAtPort(0.1, made_up(("input_delay",), 1.0), {}),
+        LikelyAtPort(share, made_up(("sensor_lag",), 1.0), {}),
+    )
+    runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
+    tried = single_effects._Tried(SimpleNamespace())
+    single_effects._begun_at_ports(tried, AtPorts({}, likely), runs)
+    assert asked == begun
+
+
+@pytest.mark.parametrize(
+    ("sse", "whiteness", "turns_on"),
+    [(130.0, 3.0, True), (100.0, 0.5, False), (1000.0, 3.0, False)],
+)
+def test_a_run_near_the_noise_turns_on(monkeypatch, sse, whiteness, turns_on):
+    """Not one that leaves noise alone, nor one that is far from it."""
+    near = made_up(("stribeck_friction",), sse, whiteness=whiteness)
+    asked = []
+
+    def best_turn(_findings, turn, _runs):
+        asked.append(turn)
+        return SimpleNamespace(fit=near, sse=turn.sse - 1.0)
+
+    monkeypatch.setattr(single_effects, "best_turn", best_turn)
+    monkeypatch.setattr(single_effects, "fit_of_run", lambda _, turn: turn.fit)
+    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0))
+    tried = single_effects._Tried(findings)
+    tried.keep([SimpleNamespace(fit=near, sse=near.sse)])
+    found = single_effects._turned_on(tried, SimpleNamespace(up_to=lambda _: None))
+    assert bool(found) is bool(asked) is turns_on
