@@ -38,6 +38,7 @@ from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import LATE_INPUT, CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
+from hwid_cli.records.drive import StandIn
 
 # A line that takes this share of what the base leaves is no colour of noise.
 LINE_SHARE = 0.3
@@ -168,6 +169,9 @@ def _refit_base(
         back = replace(end, effects={**end.effects, **waves})
         again = fit_candidate(problem, (), [back], scales, noise)
         found = min((found, again), key=lambda one: float(one.sse.sum()))
+    if isinstance(problem.drive, StandIn):
+        # It stands where the simulation's own runs have led it.
+        return found
     found = fit_through_pieces(problem, found, scales, noise)
     if not is_rugged(tuple(present)) or found.whiteness <= 1.0:
         return found

@@ -47,6 +47,9 @@ from hwid_cli.records.recordings import Recording
 # Searches, each from where the last one has moved the parameters by more than this.
 MOST_SEARCHES = 3
 _MOVED = 0.01
+# Beside an effect that runs bear out, parameters that have moved by less had hardly imitated
+# it: what else is missing is looked for at once.
+_MOVED_BESIDE_NAMED = 0.05
 # Of all runs, those after which no further single effect is tried: sets need some, too. Where
 # the configuration leaves their number open, sets have some beyond them.
 _FOR_SINGLES, _FOR_SETS = 0.75, 1.5
@@ -239,9 +242,10 @@ def _found(
         )
         if alone.findings is not None and alone.is_all:
             return alone.findings, alone.values, True
-        if is_first and have_moved(values, alone.values, _MOVED):
+        told = alone.findings
+        least = _MOVED if told is None else _MOVED_BESIDE_NAMED
+        if is_first and have_moved(values, alone.values, least):
             # What runs bear out stays unless a search from there leaves less.
-            told = alone.findings
             return told or found, alone.values, told is not None
         # Nothing more to look for: no gap, or parameters.
         if found.verdict.word in ("none", "parameters"):

@@ -636,6 +636,49 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
 
 
 @pytest.mark.parametrize(
+    ("is_borne_out", "moved", "goes_on"),
+    [
+        # Parameters that have moved had imitated what is missing: the search begins again,
+        # unless runs bear an effect out and they have moved by little.
+        (False, 1.03, False),
+        (True, 1.03, True),
+        (True, 1.10, False),
+        (False, 1.001, True),
+    ],
+)
+def test_the_search_begins_again_where_parameters_have_moved(
+    monkeypatch, is_borne_out, moved, goes_on
+):
+    chosen = made_up(("gear_backlash",), 100.0)
+    verdict = SimpleNamespace(word="unknown", chosen=chosen)
+    found = SimpleNamespace(verdict=verdict)
+    alone = ToldByRuns(found if is_borne_out else None, {"c": moved}, is_all=False)
+    asked = []
+    monkeypatch.setattr(foreign, "find", lambda *_, **__: found)
+    monkeypatch.setattr(foreign, "with_own_base", lambda one, *_: one)
+    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_, **__: alone)
+    monkeypatch.setattr(
+        foreign, "with_further_effect", lambda *_: asked.append("further") or alone
+    )
+    monkeypatch.setattr(foreign, "_is_enough", lambda _: True)
+    monkeypatch.setattr(foreign, "_of_sets", lambda *_: (found, {"c": moved}, False))
+    monkeypatch.setattr(foreign, "_with_runs", lambda one, _: one)
+    monkeypatch.setattr(foreign, "unconfirmed", lambda one: one)
+    runs = Runs(SimpleNamespace(run=simulate), CountedRuns(None))
+    told, values, is_told = foreign._found(
+        None,
+        DiagnoseOptions(),
+        (runs, {"c": 1.0}),
+        lambda *_: None,
+        None,
+        is_first=True,
+    )
+    assert bool(asked) is goes_on
+    assert (told, values) == (found, {"c": moved})
+    assert is_told is is_borne_out
+
+
+@pytest.mark.parametrize(
     ("effects", "is_confirmed", "is_found", "told"),
     [
         # A set that the simulation's run bears out needs no other one ...
