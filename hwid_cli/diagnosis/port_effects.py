@@ -210,14 +210,11 @@ class PortSearch:
     @property
     def free(self) -> dict[str, FreeParameter]:
         """Parameters of the simulation and of the effects, with their bounds."""
-        refs = {key: ParameterRef.of_text(key) for key in self.of_effects}
-        effects = {
-            key: FreeParameter(
-                self.of_effects[key],
-                CATALOGUE[ref.owner].parameter(ref.parameter).bounds(self._scales),
-            )
-            for key, ref in refs.items()
-        }
+        effects = {}
+        for key, value in self.of_effects.items():
+            ref = ParameterRef.of_text(key)
+            bounds = CATALOGUE[ref.owner].parameter(ref.parameter).bounds(self._scales)
+            effects[key] = FreeParameter(float(np.clip(value, *bounds)), bounds)
         return {**self._runs.simulator.free, **effects}
 
     @property

@@ -20,6 +20,7 @@ from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import acts_at_port
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.effect import Scales
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.programs import SimulatorRun
 
@@ -124,10 +125,12 @@ def _share(found: LikelyAtPort) -> float:
 def _refined(found: LikelyAtPort, effect: str, screening: "_Screening") -> LikelyAtPort:
     """The same effect in sizes between the start values, and what it leaves there."""
     strongest = ParameterRef(effect, CATALOGUE[effect].strongest.name)
+    bounds = CATALOGUE[effect].strongest.bounds(screening.scales)
     for factor in _BETWEEN:
         one = found.fit
         size = float(one.values[one.names.index(strongest)])
-        near = [with_values(one, {strongest: size * f}) for f in (1 / factor, factor)]
+        sizes = np.clip([size / factor, size * factor], *bounds).tolist()
+        near = [with_values(one, {strongest: another}) for another in sizes]
         found = min([found, *map(screening.of_fit, near)], key=_share)
     return found
 
@@ -194,6 +197,11 @@ class _Screening:
         if plain is None or gap is None:
             return None
         return cls(signals, search, values, gap, plain)
+
+    @property
+    def scales(self) -> Scales:
+        """Of the recordings, which bounds go with."""
+        return self._search.findings.scales
 
     def of_start(self, values: Mapping[str, Mapping[str, float]]) -> LikelyAtPort:
         """What effects with these values leave."""

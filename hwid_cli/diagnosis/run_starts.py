@@ -10,11 +10,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hwid_cli.diagnosis.held_force import is_held
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
 from hwid_cli.diagnosis.stand_in_fit import fit_stand_in
+from hwid_cli.drive.simulation import NO_FORCE
+from hwid_cli.records.drive import HELD
 from hwid_cli.records.experiment import DiagnoseOptions
-from hwid_cli.records.programs import SimulatorRun
+from hwid_cli.records.programs import RunRequest, SimulatorRun
 
 # Share of its motion within which a simulation has not moved yet, and starts at one place.
 _NOT_YET = 1e-3
@@ -98,6 +101,7 @@ def begin(
     """Run a simulation as it is given, from where the recordings start."""
     runs = Runs(simulator, run_tasks)
     given = runs.of(problem.signals, simulator.values)
+    problem, runs = _with_holds(problem, runs)
     is_said = options.initial_state != "rest"
     above = starts_above(problem.signals, given, is_said=is_said)
     starts = RunStarts()
@@ -111,6 +115,21 @@ def begin(
         given = runs.from_starts(problem.signals, given)
     signals = starts.taken_off(problem.signals)
     return Begun(replace(problem, signals=signals), runs, tuple(given), starts)
+
+
+def _with_holds(problem: DiagnosisProblem, runs: Runs) -> tuple[DiagnosisProblem, Runs]:
+    """A problem and runs that know whether the simulation holds its inputs."""
+    simulator, one = runs.simulator, problem.signals[0]
+    request = RunRequest(
+        one.name, one.sample_time_s, one.driven_by, NO_FORCE, dict(simulator.values)
+    )
+    holds_input = is_held(runs.once, request, at_force=False)
+    are_held = holds_input
+    if simulator.capabilities.force:
+        are_held = is_held(runs.once, request, at_force=True)
+    hold = HELD if holds_input else problem.drive.hold
+    drive = replace(problem.drive, hold=hold)
+    return replace(problem, drive=drive), replace(runs, are_held=are_held)
 
 
 def starts_above(

@@ -17,11 +17,12 @@ from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.simulator import Runs
-from hwid_cli.diagnosis.stand_in import force_along, moved_as, standing_for
+from hwid_cli.diagnosis.stand_in import force_beside, moved_as, standing_for
 from hwid_cli.diagnosis.standing import standing_beside
 from hwid_cli.diagnosis.turns import (
     Turn,
     acts_at_force,
+    as_sent,
     best_turn,
     forces_along,
     held,
@@ -126,7 +127,9 @@ def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
     # Of the effect alone: what the changed base does is no force of it.
     changed = replace(problem, drive=fitted_drive(problem.drive, fit))
     names = [one.name for one in problem.signals]
-    forces = dict(zip(names, forces_along(changed, motions), strict=True))
+    each = forces_along(changed, motions)
+    sent = as_sent(runs, problem, fit, each)
+    forces = dict(zip(names, sent, strict=True))
 
     def ask(
         signals: Sequence[Signals], values: Mapping[str, float]
@@ -137,7 +140,6 @@ def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
         )
 
     values = fit_parameters(ask, problem.signals, runs.simulator.free, turn.values)
-    each = [forces[one.name] for one in problem.signals]
     there = begun_with(turn, runs, values, each)
     return replace(turn, problem=held(problem)) if there is None else there
 
@@ -159,7 +161,8 @@ def begun_with(
     """
     problem = turn.problem
     given = runs.tried(problem.signals, values)
-    found = pushed(runs, problem, forces, turn.at_force, values)
+    sent = as_sent(runs, problem, turn.fit, forces)
+    found = pushed(runs, problem, sent, turn.at_force, values)
     if given is None or found is None:
         return None
     standing = standing_beside(runs, problem, given, values)
@@ -185,6 +188,6 @@ def _standing_with(
         With the force.
     """
     plain = replace(drive, effects={})
-    along = force_along(plain, moved_as(signals, found), signals.driven_by)
+    along = force_beside(plain, signals, moved_as(signals, found))
     there = standing_for(signals, found, plain, along)
     return replace(there, force=along - force, start=there.own_start)

@@ -177,11 +177,14 @@ class Runs:
     starts : mapping of str to float, [output unit]
         What is added to the outputs of recordings, by their names: a machine that goes
         on from where it is, beside a simulation that always starts at one place.
+    are_held : bool
+        Whether the simulation holds forces between samples.
     """
 
     simulator: Simulator
     run_tasks: CountedRuns
     starts: Mapping[str, float] = field(default_factory=dict)
+    are_held: bool = False
 
     def up_to(self, share: float) -> "Runs":
         """The same, spent after a share of all runs."""
@@ -224,14 +227,19 @@ class Runs:
             request = RunRequest(
                 one.name, one.sample_time_s, driven_by, force, dict(values)
             )
-            content = {"run": one.name, "parameters": dict(values)}
-            tasks.append(
-                DiagnosisTask(
-                    f"run {one.name}", run, (request,), SimulatorRun, content,
-                    (driven_by, force),
-                )
-            )  # fmt: skip
+            tasks.append(_task(run, request))
         return self.from_starts(signals, self.run_tasks(tasks, keep=True))
+
+    def once(self, request: RunRequest) -> SimulatorRun | None:
+        """One run by itself; None where it gives no answer."""
+        run = self.simulator.run
+        if run is None:
+            return None
+        try:
+            (found,) = self.run_tasks([_task(run, request)], keep=True)
+        except SimulationError:
+            return None
+        return found if isinstance(found, SimulatorRun) else None
 
     def from_starts(
         self, signals: Sequence[Signals], found: Sequence[SimulatorRun]
@@ -260,3 +268,14 @@ class Runs:
             return self.of(signals, values, forces, inputs)
         except SimulationError:
             return None
+
+
+def _task(
+    run: Callable[[RunRequest], SimulatorRun], request: RunRequest
+) -> DiagnosisTask:
+    """One run as a task, known by its recording, inputs and parameters."""
+    content = {"run": request.name, "parameters": dict(request.parameters)}
+    return DiagnosisTask(
+        f"run {request.name}", run, (request,), SimulatorRun, content,
+        (request.input, request.force),
+    )  # fmt: skip

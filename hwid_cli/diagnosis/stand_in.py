@@ -17,10 +17,12 @@ from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import Motion, parameter_vector, run, set_start
 from hwid_cli.drive.springs import spring_force, stiffness_at
-from hwid_cli.records.drive import BASE_PARAMETERS, Drive, StandIn
+from hwid_cli.records.drive import BASE_PARAMETERS, HELD, Drive, StandIn
 from hwid_cli.records.programs import SimulatorRun, StandInChange
 
 _DEGREE = 5
+# Of the largest input, what begins in balance is off by less than this share, [-].
+_IN_BALANCE = 1e-3
 # Samples before the start of a run from rest; and the share of the second step that the
 # first one may be there, [-].
 _MIRRORED = 20
@@ -170,8 +172,43 @@ def force_along(drive: Drive, moved: Moved, driven_by: np.ndarray) -> np.ndarray
         drive.mass_kg * moved.acceleration
         + drive.damping_N_s_per_m * moved.velocity
         + spring_force(drive, moved.position)
-        - drive.force_constant_N_per_A * driven_by
+        - drive.force_constant_N_per_A * along_motion(drive, driven_by)
     )
+
+
+def force_beside(drive: Drive, signals: Signals, moved: Moved) -> np.ndarray:
+    """Force that the drive needs beside its input to move as a simulation did.
+
+    One that holds its input has no acceleration at a sample, where it jumps: there the
+    force is what the motion's impulses need.
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [N]
+    """
+    if drive.hold != HELD:
+        return force_along(drive, moved, signals.driven_by)
+    motion = Motion(moved.position, moved.position, moved.velocity, signals.driven_by)
+    alone = replace(signals, force=np.zeros(0), start=seen_start(moved))
+    return force_of_motion(drive, alone, motion)
+
+
+def along_motion(drive: Drive, driven_by: np.ndarray) -> np.ndarray:
+    """Input as a smooth curve through the samples of a motion shows it.
+
+    Where it is held it jumps at each sample, and the curve goes half way.
+
+    Parameters
+    ----------
+    driven_by : ndarray, shape (n_samples,), [input unit]
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [input unit]
+    """
+    if drive.hold != HELD:
+        return driven_by
+    return np.r_[driven_by[:1], 0.5 * (driven_by[1:] + driven_by[:-1])]
 
 
 def force_of_change(drive: Drive, change: Moved, position: np.ndarray) -> np.ndarray:
@@ -304,8 +341,21 @@ def moved_plainly(
         Of the simulation, which starts there.
     """
     is_free = drive.stiffness_N_per_m == 0
-    start = seen_start(moved) if is_free else start_of(moved)
+    is_seen = is_free or starts_with_a_jump(drive, signals, force, moved)
+    start = seen_start(moved) if is_seen else start_of(moved)
     return moved_from(start, drive, signals, force)
+
+
+def starts_with_a_jump(
+    drive: Drive, signals: Signals, force: np.ndarray, moved: Moved
+) -> bool:
+    """Whether an input that is held begins out of balance with where a run starts."""
+    if drive.hold != HELD:
+        return False
+    pushed = drive.force_constant_N_per_A * signals.driven_by
+    spring = float(spring_force(drive, moved.position[:1])[0])
+    first = float(pushed[0] + force[0]) - spring
+    return abs(first) > _IN_BALANCE * float(np.max(np.abs(pushed)))
 
 
 def moved_from(
@@ -418,11 +468,17 @@ def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarra
     area = dt / 6 * (ends[1:] + ends[:-1] + 4 * spring_force(drive, middle))
     impulse = drive.mass_kg * np.diff(v) + drive.damping_N_s_per_m * way + area
     given = drive.force_constant_N_per_A * signals.driven_by
-    if signals.force.size:
-        given = given + signals.force
+    beside = signals.force if signals.force.size else np.zeros(x.size)
+    means = given[:-1] if drive.hold == HELD else _means_of_lines(given)
     # What begins in balance tells the first corner.
-    first = None if signals.start is not None else float(ends[0] - given[0])
-    return _with_means(impulse / dt - 0.5 * (given[1:] + given[:-1]), first)
+    is_known = signals.start is None
+    first = float(ends[0] - given[0] - beside[0]) if is_known else None
+    return _with_means(impulse / dt - means - _means_of_lines(beside), first)
+
+
+def _means_of_lines(corners: np.ndarray) -> np.ndarray:
+    """Means of straight lines between samples; shape (n_samples - 1,)."""
+    return np.asarray(0.5 * (corners[1:] + corners[:-1]))
 
 
 def _with_means(means: np.ndarray, first: float | None = None) -> np.ndarray:

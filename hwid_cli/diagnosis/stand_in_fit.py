@@ -20,6 +20,7 @@ from hwid_cli.diagnosis.search import fit_point
 from hwid_cli.diagnosis.stand_in import (
     STILL,
     Moved,
+    along_motion,
     force_along,
     in_newtons,
     moved_as,
@@ -27,7 +28,7 @@ from hwid_cli.diagnosis.stand_in import (
     seen_start,
 )
 from hwid_cli.drive.springs import spring_force
-from hwid_cli.records.drive import StandIn
+from hwid_cli.records.drive import LINE, StandIn
 from hwid_cli.records.programs import SimulatorRun
 
 # A spring or a damper that gives less of the force than this share is none.
@@ -61,6 +62,7 @@ def fit_stand_in(
     runs: Sequence[SimulatorRun],
     *,
     may_curve: bool = True,
+    hold: str = LINE,
 ) -> StandIn:
     """Plain drive that moves most nearly as a simulation does.
 
@@ -74,19 +76,21 @@ def fit_stand_in(
         What the simulation made of them.
     may_curve : bool
         Whether its spring may be curved.
+    hold : str
+        How the simulation's input goes on between samples; one of ``records.drive.HOLDS``.
 
     References
     ----------
     docs/method_diagnosis.md, eq. (D30).
     """
-    straight = _by_regression(signals, runs)
-    curved = _by_regression(signals, runs, is_curved=True)
+    straight = _by_regression(signals, runs, hold)
+    curved = _by_regression(signals, runs, hold, is_curved=True)
     ways = [moved_as(one, run).position for one, run in zip(signals, runs, strict=True)]
     widest = _PUSHES_BACK * max(float(np.max(np.abs(one))) for one in ways)
     is_nearer = straight.left > _STRAIGHT and curved.left <= _CURVED * straight.left
     is_curved = may_curve and is_nearer and _pushes_back(curved.drive, widest)
     best = curved if is_curved else straight
-    dry = _by_regression(signals, runs, is_dry=True)
+    dry = _by_regression(signals, runs, hold, is_dry=True)
     if dry.left <= _DRY * best.left and best.left > _STRAIGHT:
         # Friction in the simulation goes with the forces along its motion; in a free run
         # without it a damper would stand for it.
@@ -282,6 +286,7 @@ class _Balance:
 def _by_regression(
     signals: Sequence[Signals],
     runs: Sequence[SimulatorRun],
+    hold: str,
     *,
     is_curved: bool = False,
     is_dry: bool = False,
@@ -290,11 +295,13 @@ def _by_regression(
 
     Parameters
     ----------
+    hold : str
+        How the input goes on between samples.
     is_dry : bool
         Beside a friction that goes with the direction alone, where something moves; it
         is no part of the drive.
     """
-    rows, right = [], []
+    rows, right, kind = [], [], StandIn(1.0, 0.0, 0.0, 1.0, hold=hold)
     for one, found in zip(signals, runs, strict=True):
         moved = moved_as(one, found)
         size = float(np.std(one.driven_by)) or 1.0
@@ -309,9 +316,10 @@ def _by_regression(
             columns.append(np.sign(moved.velocity))
             used = _moves(moved)
         rows.append(np.column_stack(columns)[used] / size)
-        right.append(one.driven_by[used] / size)
+        right.append(along_motion(kind, one.driven_by)[used] / size)
     best = _balanced(np.concatenate(rows), np.concatenate(right), is_curved=is_curved)
-    return replace(best, drive=replace(best.drive, output=_output_of(signals[0])))
+    output = _output_of(signals[0])
+    return replace(best, drive=replace(best.drive, output=output, hold=hold))
 
 
 def _output_of(signals: Signals) -> str:

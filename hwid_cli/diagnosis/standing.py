@@ -16,9 +16,10 @@ from hwid_cli.diagnosis.run_starts import Begun, begin
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
 from hwid_cli.diagnosis.stand_in import (
     error_of,
-    force_along,
+    force_beside,
     moved_as,
     standing_for,
+    starts_with_a_jump,
     with_change,
 )
 from hwid_cli.diagnosis.stand_in_fit import fit_stand_in
@@ -107,6 +108,7 @@ def standing_beside(
     has_force = simulator.capabilities.force
     drive = replace(
         drive,
+        hold=problem.drive.hold,
         effects={k: dict(v) for k, v in simulator.effects.items()},
         own_units=MotionUnits(
             "N" if has_force else problem.input_unit,
@@ -127,7 +129,9 @@ def _standing(
 ) -> StandIn:
     """The stand-in, with where laws count from."""
     return replace(
-        fit_stand_in(problem.signals, given, may_curve=may_curve),
+        fit_stand_in(
+            problem.signals, given, may_curve=may_curve, hold=problem.drive.hold
+        ),
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,
     )
@@ -137,9 +141,13 @@ def _with_stand_in(
     problem: DiagnosisProblem, drive: StandIn, given: Sequence[SimulatorRun]
 ) -> DiagnosisProblem:
     """The problem of a drive that moves as the simulation did."""
-    signals = []
+    plain, signals, jumps = replace(drive, effects={}), [], []
     for one, found in zip(problem.signals, given, strict=True):
         moved = moved_as(one, found)
-        force = force_along(drive, moved, one.driven_by)
-        signals.append(standing_for(one, found, replace(drive, effects={}), force))
+        force = force_beside(plain, one, moved)
+        signals.append(standing_for(one, found, plain, force))
+        jumps.append(starts_with_a_jump(plain, one, force, moved))
+    if any(jumps):
+        # Starts are known of all recordings, or of none.
+        signals = [replace(one, start=one.own_start) for one in signals]
     return replace(problem, signals=tuple(signals), drive=drive)

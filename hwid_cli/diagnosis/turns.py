@@ -18,6 +18,7 @@ from hwid_cli.diagnosis.candidate import (
 )
 from hwid_cli.diagnosis.causes import left_over
 from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.held_force import are_all_forces, mean_over_steps
 from hwid_cli.diagnosis.joint_fit import (
     fitted_again,
     fitted_together,
@@ -230,7 +231,8 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
     forces = forces_along(problem, motions)
     if not all(np.isfinite(one).all() for one in forces):
         return None
-    push = partial(pushed, runs, problem, forces, turn.at_force)
+    sent = as_sent(runs, problem, turn.fit, forces)
+    push = partial(pushed, runs, problem, sent, turn.at_force)
     found = push(turn.values)
     if found is None:
         return None
@@ -278,6 +280,25 @@ def forces_along(
         force_of_motion(drive, one, motion)
         for one, motion in zip(problem.signals, motions, strict=True)
     ]
+
+
+def as_sent(
+    runs: Runs,
+    problem: DiagnosisProblem,
+    fit: CandidateFit,
+    forces: Sequence[np.ndarray],
+) -> list[np.ndarray]:
+    """Forces as a simulation is to be given them, in each recording.
+
+    Parameters
+    ----------
+    fit : CandidateFit
+        Whose effects make them.
+    """
+    effects = (*drive_effects(problem.drive), *fit.effects)
+    if runs.are_held and are_all_forces(effects):
+        return [mean_over_steps(one) for one in forces]
+    return list(forces)
 
 
 def have_moved(

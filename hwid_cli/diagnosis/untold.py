@@ -19,7 +19,7 @@ from hwid_cli.diagnosis.intervals import QUANTILE
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.simulator import DIFFERENCE, Runs, derivative
-from hwid_cli.diagnosis.turns import acts_at_force, forces_along, pushed
+from hwid_cli.diagnosis.turns import acts_at_force, as_sent, forces_along, pushed
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.diagnosis import BaseParameter, FittedEffect, Law
 from hwid_cli.records.programs import FreeParameter
@@ -229,6 +229,7 @@ class _Moving:
             layout, point = rebuilt(findings.problem, chosen, findings.scales)
             motions = simulate_at(findings.problem, layout, point)
             of_all = forces_along(findings.problem, motions)
+            of_all = as_sent(runs, findings.problem, chosen, of_all)
             forces = tuple(
                 force
                 for force, one in zip(of_all, findings.problem.signals, strict=True)

@@ -12,12 +12,17 @@ from functools import partial
 
 import numpy as np
 
+from hwid_cli.diagnosis.held_force import (
+    are_all_forces,
+    is_held,
+    mean_over_steps,
+)
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.stand_in import (
     act_as_forces,
     corrected,
     derived,
-    force_along,
+    force_beside,
     force_of_motion,
     moved_from,
     seen_start,
@@ -131,6 +136,7 @@ def _settled(
 ) -> ExtendedRun:
     """Run after run until simulation and drive agree; the one that agrees best."""
     plain, stand_in = drives
+    is_mean = _holds_forces(simulate, request, stand_in, at_force=at_force)
     given = simulate(request)
     signals = _standing(plain, given, request)
     best = ExtendedRun(given.output, given.velocity, np.inf)
@@ -139,7 +145,8 @@ def _settled(
         force = force_of_motion(plain, signals, motion)
         if not np.isfinite(force).all():
             break
-        found = simulate(_pushed(request, force, plain, at_force=at_force))
+        sent = mean_over_steps(force) if is_mean else force
+        found = simulate(_pushed(request, sent, plain, at_force=at_force))
         late = found.output - signals.seen(motion) - signals.offset
         least = _NEGLIGIBLE * float(np.std(given.output))
         size = max(float(np.std(found.output - given.output)), least) or 1.0
@@ -155,6 +162,26 @@ def _settled(
     return best
 
 
+def _holds_forces(
+    simulate: Callable[[RunRequest], SimulatorRun],
+    request: RunRequest,
+    stand_in: Drive,
+    *,
+    at_force: bool,
+) -> bool:
+    """Whether forces of the effects are held between samples where they act."""
+    if not are_all_forces(tuple(drive_effects(stand_in))):
+        return False
+
+    def once(one: RunRequest) -> SimulatorRun | None:
+        try:
+            return simulate(one)
+        except SimulationError:
+            return None
+
+    return is_held(once, request, at_force=at_force)
+
+
 def _standing(plain: Drive, given: SimulatorRun, request: RunRequest) -> Signals:
     """What makes the stand-in without effects move as the simulation did."""
     is_velocity = plain.output == "velocity"
@@ -162,8 +189,9 @@ def _standing(plain: Drive, given: SimulatorRun, request: RunRequest) -> Signals
     signals = Signals(
         request.name, "", request.input, given.output, request.input, given.output,
         request.sample_time_s, start=seen_start(moved), own_start=seen_start(moved),
-        is_velocity=is_velocity, force=force_along(plain, moved, request.input),
+        is_velocity=is_velocity,
     )  # fmt: skip
+    signals = replace(signals, force=force_beside(plain, signals, moved))
     there = moved_from(signals.start, plain, signals, signals.force)
     return replace(signals, offset=given.output - signals.seen(there))
 
