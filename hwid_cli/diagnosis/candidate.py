@@ -342,7 +342,7 @@ def evaluated(
         parts[row] = part_of_row
     sse = each_sum_of_squares(parts)
     is_usable = bool(np.isfinite(sse).all())
-    neighbour = _neighbour(parts) if is_usable else 0.0
+    neighbour = neighbour_of(parts) if is_usable else 0.0
     drives = drives_at(problem, best.layout, ParameterPoint(best.point.shared, own))
     white, cause = left_over(parts, problem, drives, noise)
     shared = zip(best.layout.shared, best.point.shared, strict=True)
@@ -370,10 +370,16 @@ def _own_values(fit_layout: ParameterLayout, own: np.ndarray) -> np.ndarray:
     return np.array(values).reshape(own.shape)
 
 
-def _neighbour(parts: list[np.ndarray]) -> float:
-    """Correlation of neighbouring residuals."""
+def neighbour_of(parts: Sequence[np.ndarray]) -> float:
+    """Correlation of neighbouring residuals.
+
+    Parameters
+    ----------
+    parts : sequence of ndarray, shape (n_evaluated,), [output unit]
+        Of each recording.
+    """
     together = sum(float(part[1:] @ part[:-1]) for part in parts)
-    size = sum_of_squares(parts)
+    size = sum_of_squares(list(parts))
     return together / size if size > 0 else 0.0
 
 
@@ -483,7 +489,7 @@ def at_point(
         own=np.array(own).reshape(point.own.shape),
         sse=sse,
         whiteness=white,
-        neighbour=_neighbour(parts),
+        neighbour=neighbour_of(parts),
         cause=cause,
         valleys=np.zeros((0, 0)),
     )

@@ -6,12 +6,11 @@ input tells: held, it changes nothing before the next sample.
 docs/method_diagnosis.md, eq. (D32f).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.stand_in import act_as_forces, changes_input
 from hwid_cli.records.programs import RunRequest, SimulatorRun
 
 # Where the step of a trial is, in a recording of so many samples at least.
@@ -60,11 +59,6 @@ def is_held(run: RunOnce, request: RunRequest, *, at_force: bool) -> bool:
             near = change[:_FEWEST]
             return bool(np.argmax(near > _CHANGED * near.max()) > _AT)
     return False
-
-
-def are_all_forces(effects: Sequence[str]) -> bool:
-    """Whether effects act as forces; one that changes the input is held as that is."""
-    return act_as_forces(effects) and not any(changes_input((one,)) for one in effects)
 
 
 def mean_over_steps(force: np.ndarray) -> np.ndarray:

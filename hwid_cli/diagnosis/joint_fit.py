@@ -125,7 +125,7 @@ def pushes_of(
     for one, slope, run in zip(problem.signals, slopes, found, strict=True):
         position = moved_as(one, run).position
         each = [
-            force_of_change(drive, _moved_by(column, one), position)
+            force_of_change(drive, _moved_by(column, one), position, one.sample_time_s)
             for column in slope.T
         ]
         pushes.append(np.array(each).reshape(-1, slope.shape[0]).T)

@@ -26,7 +26,14 @@ from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.settling import begun_with
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import changes_input, moved_as
-from hwid_cli.diagnosis.turns import Turn, best_turn, forces_along, held, pushed
+from hwid_cli.diagnosis.turns import (
+    Turn,
+    as_sent,
+    best_turn,
+    forces_along,
+    held,
+    pushed,
+)
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.output import read
@@ -258,7 +265,8 @@ class PortSearch:
         if forces is None:
             return None
         rows = {one.name: row for row, one in enumerate(self._problem.signals)}
-        chosen = [forces[rows[one.name]] for one in signals]
+        sent = as_sent(self._runs, self._problem, forces, at_force=False)
+        chosen = [sent[rows[one.name]] for one in signals]
         some = replace(self._problem, signals=tuple(signals))
         return pushed(self._runs, some, chosen, False, own)
 

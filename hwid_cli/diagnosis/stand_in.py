@@ -211,7 +211,9 @@ def along_motion(drive: Drive, driven_by: np.ndarray) -> np.ndarray:
     return np.r_[driven_by[:1], 0.5 * (driven_by[1:] + driven_by[:-1])]
 
 
-def force_of_change(drive: Drive, change: Moved, position: np.ndarray) -> np.ndarray:
+def force_of_change(
+    drive: Drive, change: Moved, position: np.ndarray, sample_time_s: float
+) -> np.ndarray:
     """Further force that a drive needs to move a little differently.
 
     Parameters
@@ -223,10 +225,16 @@ def force_of_change(drive: Drive, change: Moved, position: np.ndarray) -> np.nda
     -------
     ndarray, shape (n_samples,), [N]
     """
+    spring = stiffness_at(drive, position) * change.position
+    if drive.hold == HELD:
+        # What a parameter changes jumps with the input: impulses do not.
+        impulse = drive.mass_kg * np.diff(change.velocity)
+        impulse = impulse + drive.damping_N_s_per_m * np.diff(change.position)
+        return _with_means(impulse / sample_time_s + _means_of_lines(spring))
     return np.asarray(
         drive.mass_kg * change.acceleration
         + drive.damping_N_s_per_m * change.velocity
-        + stiffness_at(drive, position) * change.position
+        + spring
     )
 
 
@@ -401,7 +409,8 @@ def corrected(
     there = moved_as(signals, SimulatorRun(target, nothing))
     # Half way between where it was and where it has to be.
     place = there.position - 0.5 * change.position
-    more = signals.force + _slow(force_of_change(drive, change, place))
+    further = force_of_change(drive, change, place, signals.sample_time_s)
+    more = signals.force + _slow(further)
     start = start_of(there) or signals.own_start
     plain = moved_from(start, drive, signals, more + force)
     return replace(

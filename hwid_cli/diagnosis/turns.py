@@ -13,12 +13,13 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate import (
     fitted_drive,
+    neighbour_of,
     rebuilt,
     without_starts,
 )
 from hwid_cli.diagnosis.causes import left_over
 from hwid_cli.diagnosis.findings import Findings
-from hwid_cli.diagnosis.held_force import are_all_forces, mean_over_steps
+from hwid_cli.diagnosis.held_force import mean_over_steps
 from hwid_cli.diagnosis.joint_fit import (
     fitted_again,
     fitted_together,
@@ -41,7 +42,7 @@ from hwid_cli.diagnosis.stand_in import (
 )
 from hwid_cli.drive.simulation import Motion, drive_effects
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
-from hwid_cli.records.drive import BASE_PARAMETERS
+from hwid_cli.records.drive import BASE_PARAMETERS, HELD
 from hwid_cli.records.programs import FreeParameter, SimulatorRun
 
 # Runs with the effect, and the share of what remains (or of the noise) by which loop and
@@ -231,7 +232,7 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
     forces = forces_along(problem, motions)
     if not all(np.isfinite(one).all() for one in forces):
         return None
-    sent = as_sent(runs, problem, turn.fit, forces)
+    sent = as_sent(runs, problem, forces, at_force=turn.at_force)
     push = partial(pushed, runs, problem, sent, turn.at_force)
     found = push(turn.values)
     if found is None:
@@ -285,20 +286,21 @@ def forces_along(
 def as_sent(
     runs: Runs,
     problem: DiagnosisProblem,
-    fit: CandidateFit,
     forces: Sequence[np.ndarray],
+    *,
+    at_force: bool,
 ) -> list[np.ndarray]:
     """Forces as a simulation is to be given them, in each recording.
 
     Parameters
     ----------
-    fit : CandidateFit
-        Whose effects make them.
+    forces : sequence of ndarray, shape (n_samples,), [N]
+        In straight lines between samples.
+    at_force : bool
+        At its force input, not through its input.
     """
-    effects = (*drive_effects(problem.drive), *fit.effects)
-    if runs.are_held and are_all_forces(effects):
-        return [mean_over_steps(one) for one in forces]
-    return list(forces)
+    is_held = runs.are_held if at_force else problem.drive.hold == HELD
+    return [mean_over_steps(one) for one in forces] if is_held else list(forces)
 
 
 def have_moved(
@@ -480,7 +482,7 @@ def fit_of_run(findings: Findings, turn: Turn) -> CandidateFit:
             names=(*(ParameterRef(BASE, name) for name in names), *fit.names),
             values=np.r_[[getattr(drive, name) for name in names], fit.values],
         )
-    fit = replace(fit, sse=turn.sse)
+    fit = replace(fit, sse=turn.sse, neighbour=neighbour_of(turn.left))
     # At corners a force between samples is late as an input is, by a little.
     is_late = findings.criteria.ratio(fit) <= _LATE_AT_CORNERS
     noise = findings.criteria.noise

@@ -225,17 +225,17 @@ class _Moving:
         chosen, problem = findings.verdict.chosen, findings.problem.part(held_out=False)
         enters = {CATALOGUE[one].enters for one in chosen.effects}
         forces: tuple[np.ndarray, ...] = ()
+        at_force = acts_at_force(findings.problem, chosen, runs)
         if enters - {"output"}:
             layout, point = rebuilt(findings.problem, chosen, findings.scales)
             motions = simulate_at(findings.problem, layout, point)
             of_all = forces_along(findings.problem, motions)
-            of_all = as_sent(runs, findings.problem, chosen, of_all)
+            of_all = as_sent(runs, findings.problem, of_all, at_force=at_force)
             forces = tuple(
                 force
                 for force, one in zip(of_all, findings.problem.signals, strict=True)
                 if not one.is_held_out
             )
-        at_force = acts_at_force(findings.problem, chosen, runs)
         noise = findings.criteria.noise.rms
         return cls(runs, problem, values, free, forces, at_force, noise)
 

@@ -13,7 +13,6 @@ from functools import partial
 import numpy as np
 
 from hwid_cli.diagnosis.held_force import (
-    are_all_forces,
     is_held,
     mean_over_steps,
 )
@@ -36,7 +35,7 @@ from hwid_cli.drive.simulation import (
     set_start,
 )
 from hwid_cli.errors import SimulationError
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import HELD, Drive
 from hwid_cli.records.programs import Program, RunRequest, SimulatorRun
 from hwid_cli.records.units import as_percent
 from hwid_cli.simulations.kinds import kind_named
@@ -136,7 +135,7 @@ def _settled(
 ) -> ExtendedRun:
     """Run after run until simulation and drive agree; the one that agrees best."""
     plain, stand_in = drives
-    is_mean = _holds_forces(simulate, request, stand_in, at_force=at_force)
+    is_mean = _is_held(simulate, request) if at_force else plain.hold == HELD
     given = simulate(request)
     signals = _standing(plain, given, request)
     best = ExtendedRun(given.output, given.velocity, np.inf)
@@ -162,16 +161,10 @@ def _settled(
     return best
 
 
-def _holds_forces(
-    simulate: Callable[[RunRequest], SimulatorRun],
-    request: RunRequest,
-    stand_in: Drive,
-    *,
-    at_force: bool,
+def _is_held(
+    simulate: Callable[[RunRequest], SimulatorRun], request: RunRequest
 ) -> bool:
-    """Whether forces of the effects are held between samples where they act."""
-    if not are_all_forces(tuple(drive_effects(stand_in))):
-        return False
+    """Whether a simulation holds the force that acts on it between samples."""
 
     def once(one: RunRequest) -> SimulatorRun | None:
         try:
@@ -179,7 +172,7 @@ def _holds_forces(
         except SimulationError:
             return None
 
-    return is_held(once, request, at_force=at_force)
+    return is_held(once, request, at_force=True)
 
 
 def _standing(plain: Drive, given: SimulatorRun, request: RunRequest) -> Signals:

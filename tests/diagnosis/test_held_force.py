@@ -8,7 +8,7 @@ from scipy.signal import cont2discrete, lsim
 
 from hwid_cli import Recording
 from hwid_cli.diagnosis.foreign import diagnose_foreign
-from hwid_cli.diagnosis.held_force import are_all_forces, is_held, mean_over_steps
+from hwid_cli.diagnosis.held_force import is_held, mean_over_steps
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
 from hwid_cli.drive.simulation import NO_FORCE
 from hwid_cli.errors import SimulationError
@@ -103,12 +103,6 @@ def test_a_held_mean_moves_a_stage_as_the_line_does():
     mean = float(np.std(held(of(mean_over_steps(force))).output - line))
     assert late > 0.05 * size
     assert mean < 0.02 * size
-
-
-def test_an_effect_of_the_input_is_held_as_the_input_is():
-    assert are_all_forces(("coulomb_friction", "gravity"))
-    assert not are_all_forces(("input_dead_zone",))
-    assert not are_all_forces(("coulomb_friction", "input_delay"))
 
 
 def measured(levels, rng):

@@ -430,10 +430,10 @@ def test_a_small_further_force_moves_a_curved_stand_in_as_it_says(given):
     before = moved_plainly(CURVED, given[0], 0 * TIME, nothing).position
     after = moved_plainly(CURVED, given[0], push, nothing).position
     change = derived(SimulatorRun(after - before, NOTHING), STEP_S)
-    found = force_of_change(CURVED, change, 0.5 * (before + after))
+    found = force_of_change(CURVED, change, 0.5 * (before + after), 1.0)
     # Ends of the spline apart.
     assert np.max(np.abs(found - push)[20:-20]) < 0.01 * np.max(push)
-    straight = force_of_change(replace(CURVED, cubic_N_per_m3=0.0), change, before)
+    straight = force_of_change(replace(CURVED, cubic_N_per_m3=0.0), change, before, 1.0)
     assert np.max(np.abs(straight - push)[20:-20]) > 0.1 * np.max(push)
 
 
