@@ -357,7 +357,13 @@ def moved_plainly(
 def starts_with_a_jump(
     drive: Drive, signals: Signals, force: np.ndarray, moved: Moved
 ) -> bool:
-    """Whether an input that is held begins out of balance with where a run starts."""
+    """Whether an input that is held begins out of balance with where a run starts.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n_samples,), [N]
+        Beside the input.
+    """
     if drive.hold != HELD:
         return False
     pushed = drive.force_constant_N_per_A * signals.driven_by
