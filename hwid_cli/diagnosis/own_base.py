@@ -15,11 +15,8 @@ from hwid_cli.diagnosis.parameters import BASE, each_sum_of_squares
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import Simulator
+from hwid_cli.diagnosis.verdict import LEAST_OF_RIVALS
 from hwid_cli.records.candidates import CandidateFit
-
-# What factors of the stand-in leave is a rival of each effect, which explains at least this
-# share of it, [-].
-_LEAST_OF_FACTORS = 0.35
 
 
 def with_own_base(
@@ -82,8 +79,11 @@ def gap_without(findings: Findings) -> np.ndarray:
 
 
 def is_beyond_factors(findings: Findings, fit: CandidateFit) -> bool:
-    """Whether effects explain a good part of what factors of the stand-in leave, too."""
+    """Whether effects explain a good part of what factors of the stand-in leave, too.
+
+    These are rivals of each effect.
+    """
     if findings.own_base is None:
         return True
     against = findings.criteria.evidence(fit, findings.base)
-    return against.explained >= _LEAST_OF_FACTORS and against.gain >= LEAST_GAIN
+    return against.explained >= LEAST_OF_RIVALS and against.gain >= LEAST_GAIN

@@ -232,8 +232,8 @@ class PortSearch:
         """Where to begin: parameters as fitted and as stated, a new effect of any size."""
         new = {k: one for k, one in self.of_effects.items() if k not in values}
         sizes = [new]
-        for effect in {ParameterRef.of_text(key).owner for key in new}:
-            of = {key: _name(key) for key in new}
+        of = {key: _name(key) for key in new}
+        for effect in dict.fromkeys(ParameterRef.of_text(key).owner for key in new):
             starts = CATALOGUE[effect].starts(self._scales)
             sizes += [{key: one[name] for key, name in of.items()} for one in starts]
         stated = {**values, **self._runs.simulator.values}

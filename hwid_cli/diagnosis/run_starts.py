@@ -118,14 +118,8 @@ def begin(
 
 
 def _with_holds(problem: DiagnosisProblem, runs: Runs) -> tuple[DiagnosisProblem, Runs]:
-    """A problem and runs that know whether the simulation holds its inputs.
-
-    A fitted model has nothing between its samples, and neither force nor parameters that
-    half a sample could mislead.
-    """
+    """A problem and runs that know whether the simulation holds its inputs."""
     simulator, one = runs.simulator, problem.signals[0]
-    if not (simulator.free or simulator.capabilities.force):
-        return problem, runs
     request = RunRequest(
         one.name, one.sample_time_s, one.driven_by, NO_FORCE, dict(simulator.values)
     )

@@ -12,10 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from hwid_cli.diagnosis.held_force import (
-    is_held,
-    mean_over_steps,
-)
+from hwid_cli.diagnosis.held_force import is_held, mean_over_steps
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.stand_in import (
     act_as_forces,
