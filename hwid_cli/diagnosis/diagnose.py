@@ -582,17 +582,24 @@ def _has_short_law(searched: _Searched, options: DiagnoseOptions) -> bool:
     Larger sets, which take most of the time, would only imitate it.
     """
     rounds, found = searched.rounds, searched.found
-    is_open = _may_be_law(options) and rounds.criteria.standing is None
-    if not is_open or not found.best:
+    if not _may_be_law(options) or not found.best:
         return False
-    if rounds.criteria.ratio(found.best[-1]) <= STILL_LARGE:
+    criteria, best = rounds.criteria, found.best[-1]
+    # Where a drive stands for another simulation, the rest may be its own error: only a law
+    # that is all of it makes larger sets needless.
+    stands_in = criteria.standing is not None
+    if criteria.ratio(best) <= STILL_LARGE and not stands_in:
+        return False
+    if criteria.is_nearly_all(best, rounds.base):
         return False
     verdict = decided(rounds, searched.given_sse, found)
     told, _, law = find_law(
         rounds, searched.before, searched.force, found, verdict, len(found.best)
     )
-    left = rounds.criteria.ratio(told.chosen)
-    return law is not None and left <= _LEFT_BY_SHORT_LAW
+    chosen = told.chosen
+    if law is None or criteria.ratio(chosen) > _LEFT_BY_SHORT_LAW:
+        return False
+    return criteria.leaves_noise(chosen) or not stands_in
 
 
 def _may_be_law(options: DiagnoseOptions) -> bool:

@@ -16,7 +16,7 @@ from hwid_cli.diagnosis.through_pieces import fit_through_pieces
 from hwid_cli.drive.effect import Scales
 from hwid_cli.records.candidates import LATE_INPUT, CandidateFit
 from hwid_cli.records.diagnosis import NoiseFloor
-from hwid_cli.records.drive import HELD
+from hwid_cli.records.drive import HELD, StandIn
 
 # Each further sample that is tried leaves clearly less than the one before.
 _CLEARLY_LESS = 0.97
@@ -48,7 +48,9 @@ def with_earlier_input(
             )
             start = start_from(problem.drive, base)
             found = fit_candidate(earlier, (), [start], scales, noise)
-            found = fit_through_pieces(earlier, found, scales, noise)
+            if not isinstance(problem.drive, StandIn):
+                # As its base, which stands where runs have led it.
+                found = fit_through_pieces(earlier, found, scales, noise)
             left = float(found.sse.sum())
             if not (found.is_usable and left < _CLEARLY_LESS * least):
                 break

@@ -39,6 +39,7 @@ from hwid_cli.diagnosis.tasks import DiagnosisTask
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.drive import StandIn
 
 # Candidates on top of a set, by their forecasts, that are screened; among them so many
 # that include no other one, since all shapes of one law may come first.
@@ -98,8 +99,11 @@ class Proposals:
         if parent is rounds.base:
             self._forecasts, self._error = found, at.error
             self.shares.update({(one.effect,): one.share for one in found})
-        else:
-            found = _most_promising(found)
+        # A stand-in with an effect has it from runs: beside it stands a second one.
+        is_single = parent is rounds.base and not (
+            present and isinstance(rounds.problem.drive, StandIn)
+        )
+        found = found if is_single else _most_promising(found)
         base = base_start(rounds.problem.drive, parent)
         from_fit = SearchStart(base, start_values(parent, present))
         stated, n_stated = self._stated(parent, present)

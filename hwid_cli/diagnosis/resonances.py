@@ -44,20 +44,26 @@ _REACH, _LATE = 9.0, (-1.0, 3.0)
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Lines of the spectra of one recording.
+    """Lines of the spectra of some recordings, filled up with lines that count 0.
 
     Parameters
     ----------
-    angular : ndarray, shape (n_lines,), [rad/s]
-    given : ndarray of complex, shape (n_lines, 2), [A s] or [V s], and [N s]
+    angular : ndarray, shape (n_recordings, n_lines), [rad/s]
+    given : ndarray of complex, shape (n_recordings, n_lines, 2), [A s] or [V s], and [N s]
         The input, and the force beside it.
-    measured : ndarray of complex, shape (n_lines,), [m s]
+    measured : ndarray of complex, shape (n_recordings, n_lines), [m s]
+    counted : ndarray, shape (n_recordings, n_lines), [-]
+        1, or 0 where there is no line.
+    weights : ndarray, shape (n_recordings, n_lines), [1/(m s)]
+        What makes shares of what is left.
     sample_time_s : float, [s]
     """
 
     angular: np.ndarray
     given: np.ndarray
     measured: np.ndarray
+    counted: np.ndarray
+    weights: np.ndarray
     sample_time_s: float
 
 
@@ -109,7 +115,7 @@ def resonance_starts(
         Id in the catalogue, of one that resonates.
     """
     train = problem.part(held_out=False).signals
-    lines = [_lines_of(one) for one in _moving_most(train)]
+    lines = _lines_of(_moving_most(train))
     resonant = CATALOGUE[effect].resonant
     low, highest = _LOWEST * scales.natural_Hz, _highest(lines)
     if resonant is None or not low < highest:
@@ -131,34 +137,51 @@ def _moving_most(signals: Sequence[Signals]) -> list[Signals]:
     return ranked[:_MOST_RECORDINGS]
 
 
-def _lines_of(signals: Signals) -> Lines:
-    """Strongest lines of one recording."""
+def _lines_of(recordings: Sequence[Signals]) -> Lines:
+    """Strongest lines of each recording."""
+    shape = (len(recordings), _MOST_LINES)
+    angular, counted, weights = np.ones(shape), np.zeros(shape), np.zeros(shape)
+    measured, given = np.zeros(shape, complex), np.zeros((*shape, 2), complex)
+    for row, one in enumerate(recordings):
+        spectra, at = _spectra(one)
+        strongest = np.argsort(-np.abs(spectra[0]))[:_MOST_LINES]
+        chosen = np.sort(strongest)
+        n = slice(chosen.size)
+        angular[row, n], measured[row, n] = at[chosen], spectra[0, chosen]
+        given[row, n], counted[row, n] = spectra[1:, chosen].T, 1.0
+        sizes = np.abs(measured[row, n])
+        usual = _LEAST_LINE * np.sqrt(np.mean(sizes**2))
+        weights[row, n] = 1.0 / (sizes + usual)
+    sample_time_s = recordings[0].sample_time_s
+    return Lines(angular, given, measured, counted, weights, sample_time_s)
+
+
+def _spectra(signals: Signals) -> tuple[np.ndarray, np.ndarray]:
+    """Spectra of output, input and force, and the angular frequencies of their lines.
+
+    Returns
+    -------
+    ndarray of complex, shape (3, n_lines), [m s], [A s] or [V s], [N s]
+    ndarray, shape (n_lines,), [rad/s]
+    """
     output = signals.compared
     if signals.offset is not None:
         output = output - signals.offset
     finite = np.where(np.isfinite(output), output, 0.0)
     force = signals.force if signals.force.size else np.zeros(finite.size)
-    measured, *given = np.fft.rfft([finite, signals.driven_by, force])
+    spectra = np.fft.rfft([finite, signals.driven_by, force])
     angular = 2 * np.pi * np.fft.rfftfreq(finite.size, signals.sample_time_s)
     usable = np.arange(angular.size) >= _FIRST_LINE
     usable &= angular < 2 * np.pi * _HIGHEST / signals.sample_time_s
-    strongest = np.argsort(-np.abs(measured) * usable)[:_MOST_LINES]
-    chosen = np.sort(strongest[usable[strongest]])
-    return Lines(
-        angular[chosen], np.column_stack(given)[chosen], measured[chosen],
-        signals.sample_time_s,
-    )  # fmt: skip
+    return spectra[:, usable], angular[usable]
 
 
-def _highest(lines: Sequence[Lines]) -> float:
+def _highest(lines: Lines) -> float:
     """Frequency beyond which recordings hold next to no energy, [Hz]."""
-    highest = 0.0
-    for one in lines:
-        energy = np.abs(one.measured) ** 2
-        above = np.cumsum(energy[::-1])[::-1]
-        strong = one.angular[above > _LEAST_ENERGY * energy.sum()]
-        highest = max(highest, float(strong.max(initial=0.0)))
-    return highest / (2 * np.pi)
+    energy = np.abs(lines.measured) ** 2
+    above = np.cumsum(energy[:, ::-1], axis=1)[:, ::-1]
+    strong = above > _LEAST_ENERGY * energy.sum(axis=1, keepdims=True)
+    return float(np.max(lines.angular, where=strong, initial=0.0)) / (2 * np.pi)
 
 
 def _different(found: Sequence[tuple[float, np.ndarray]]) -> list[np.ndarray]:
@@ -173,9 +196,7 @@ def _different(found: Sequence[tuple[float, np.ndarray]]) -> list[np.ndarray]:
 class _Search:
     """Search in spectra, over the logarithms of all parameters."""
 
-    def __init__(
-        self, drive: Drive, effect: str, scales: Scales, lines: Sequence[Lines]
-    ) -> None:
+    def __init__(self, drive: Drive, effect: str, scales: Scales, lines: Lines) -> None:
         self._drive, self._effect, self._lines = drive, effect, lines
         self._base = [one for one in drive.fitted_base if getattr(drive, one) != 0.0]
         parameters = CATALOGUE[effect].parameters
@@ -220,9 +241,8 @@ class _Search:
         effects = {**self._drive.effects, **at.effects}
         base: Mapping[str, Any] = at.base
         equations = equations_with_force(replace(self._drive, **base, effects=effects))
-        late = float(coordinates[-1])
-        parts = [_left_of(one, equations, late, by_shares) for one in self._lines]
-        return np.concatenate(parts)
+        weights = self._lines.weights if by_shares else self._lines.counted
+        return _left_of(self._lines, equations, float(coordinates[-1]), weights)
 
 
 def _slopes(
@@ -238,26 +258,58 @@ def _left_of(
     lines: Lines,
     equations: tuple[np.ndarray, np.ndarray, np.ndarray],
     late: float,
-    by_shares: bool,
+    weights: np.ndarray,
 ) -> np.ndarray:
     """What no motion at the start and at the end of a recording explains either.
 
     Of a recording from 0 to T the spectrum is c (jw - A)^-1 (B U + z(0) - z(T)) at its own
     lines, where e^-jwT is 1.
+
+    Parameters
+    ----------
+    late : float
+        Of the input, in samples.
+    weights : ndarray, shape (n_recordings, n_lines), [-] or [1/(m s)]
+
+    Returns
+    -------
+    ndarray, shape (2 n_recordings n_lines,), [m s] or [-]
     """
     a, b, c = equations
-    at = 1j * lines.angular
-    reading = np.linalg.solve(
-        (at[:, None, None] * np.eye(c.size) - a).transpose(0, 2, 1),
-        np.broadcast_to(c.astype(complex)[:, None], (at.size, c.size, 1)),
-    )[:, :, 0]
-    delayed = lines.given * np.exp(-at * late * lines.sample_time_s)[:, None]
-    left = lines.measured - (reading * (delayed @ b.T)).sum(axis=1)
-    if by_shares:
-        usual = _LEAST_LINE * np.sqrt(np.mean(np.abs(lines.measured) ** 2))
-        weights = 1.0 / (np.abs(lines.measured) + usual)
-        left, reading = weights * left, weights[:, None] * reading
-    columns = np.vstack([reading.real, reading.imag])
-    basis, _ = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))
-    whole = np.concatenate([left.real, left.imag])
-    return np.asarray(whole - basis @ (basis.T @ whole))
+    reading = _reading(lines.angular, a, c)
+    delay = np.exp(-1j * late * lines.sample_time_s * lines.angular)
+    moved = (reading * (lines.given @ b.T)).sum(axis=2)
+    left = weights * (lines.measured - delay * moved)
+    reading *= weights[:, :, None]
+    columns = np.concatenate([reading.real, reading.imag], axis=1)
+    columns /= np.sqrt(np.einsum("rlc,rlc->rc", columns, columns))[:, None, :]
+    basis, _ = np.linalg.qr(columns)
+    whole = np.concatenate([left.real, left.imag], axis=1)
+    along = np.einsum("rlc,rl->rc", basis, whole)
+    return np.asarray(whole - np.einsum("rlc,rc->rl", basis, along)).ravel()
+
+
+def _reading(angular: np.ndarray, a: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Row c (jw - A)^-1 at many frequencies, by one triangular form of A.
+
+    Parameters
+    ----------
+    angular : ndarray, shape (n_recordings, n_lines), [rad/s]
+    a : ndarray, shape (n_states, n_states), [1/s]
+    c : ndarray, shape (n_states,)
+
+    Returns
+    -------
+    ndarray of complex, shape (n_recordings, n_lines, n_states)
+
+    References
+    ----------
+    Laub, Efficient multivariable frequency response computations, IEEE TAC 26 (1981).
+    """
+    triangle, unitary = scipy.linalg.schur(a, output="complex")
+    at = 1j * angular.ravel()
+    solved = np.empty((c.size, at.size), complex)
+    for n, one in enumerate(c @ unitary):
+        above = one + triangle[:n, n] @ solved[:n]
+        solved[n] = above / (at - triangle[n, n])
+    return np.asarray(solved.T @ unitary.conj().T).reshape(*angular.shape, c.size)

@@ -41,6 +41,8 @@ class RunSettings:
     ----------
     force : bool
         Compute again what the store already has.
+    fresh : set of str
+        Keys of what was computed with these settings, which force spares; filled here.
     on_done : callable or None
         Called with every ``TaskDone`` as it comes, in any order.
     """
@@ -49,6 +51,7 @@ class RunSettings:
     workers: Workers = field(default_factory=Workers)
     force: bool = False
     on_done: Callable[[TaskDone], None] | None = None
+    fresh: set[str] = field(default_factory=set)
 
 
 def run_tasks(tasks: Sequence[Task], settings: RunSettings) -> tuple[TaskDone, ...]:
@@ -79,7 +82,7 @@ def run_tasks(tasks: Sequence[Task], settings: RunSettings) -> tuple[TaskDone, .
     missing: dict[str, list[int]] = {}
     for number, task in enumerate(tasks):
         found = None
-        if not settings.force:
+        if not settings.force or task.key in settings.fresh:
             found = settings.store.get(task.key, task.result_type)
         if found is None:
             # Tasks with the same content are computed once.
@@ -92,5 +95,6 @@ def run_tasks(tasks: Sequence[Task], settings: RunSettings) -> tuple[TaskDone, .
     with closing(compute(unique, settings.workers)) as results:
         for key, (result, packed) in results:
             settings.store.put_packed(key, packed)
+            settings.fresh.add(key)
             finish(missing[key], result, from_cache=False)
     return tuple(done[number] for number in range(len(tasks)))

@@ -51,6 +51,14 @@ def test_force_computes_again_and_replaces_what_was_kept():
     assert done[2].result == store.get("key2", Orders) == Orders(3, 2, 1)
 
 
+def test_force_spares_what_was_computed_with_the_same_settings():
+    settings = RunSettings(MemoryStore(), Workers(1), force=True)
+    run_tasks(order_tasks(), settings)
+    again = run_tasks(order_tasks(), settings)
+
+    assert all(item.from_cache for item in again)
+
+
 def test_each_result_is_stored_before_it_is_reported():
     store, seen = MemoryStore(), []
 
