@@ -32,6 +32,8 @@ TABLES = "tables.txt"
 _RUN = "run"
 # Stages whose results are easier read on the page, where there is none yet.
 _WITH_PAGE = ("diagnose", "test")
+# They make no model; those of earlier runs may be older than the recordings.
+_WITHOUT_MODEL = ("diagnose", "calibrate", "next")
 # Of a diagnosis; the page has all.
 _MOST_WARNINGS = 2
 # What follows a stage, unless its results say more.
@@ -57,7 +59,7 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
     if session.is_quiet:
         return
     diagnosis = session.results.get("diagnose")
-    best = None if name in ("diagnose", "calibrate") else _best(session)
+    best = None if name in _WITHOUT_MODEL else _best(session)
     rows = []
     if best is not None:
         rows += [("best model", one) for one in best_model_sentences(best)]

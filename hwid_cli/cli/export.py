@@ -14,6 +14,7 @@ from hwid_cli.data.signal_units import as_files_are
 from hwid_cli.errors import ConfigError, SimulationError
 from hwid_cli.export.contents import (
     SIMULATION,
+    TITLE,
     card_of_program,
     export_model,
     export_simulation,
@@ -175,10 +176,10 @@ def _named_fits(session: Session, asked: str) -> tuple[dict[str, Fit], str]:
     has_groups = experiment.group is not None or has_left_results(
         session.out / results_file("group"), "group"
     )
-    # The search takes long: a name of a single recording does not start it.
-    is_single = asked.rsplit("/", 2)[0] in {
-        recording.name for recording in result_of(session, "calibrate").recordings
-    }
+    # The search takes long: what cannot be a name of several recordings does not start it.
+    is_other = "+" not in asked and not asked.startswith(TITLE)
+    names = {one.name for one in result_of(session, "calibrate").recordings}
+    is_single = is_other or asked.rsplit("/", 2)[0] in names
     search = result_of(session, "group") if has_groups and not is_single else None
     stored = StoredResults(
         experiment.name,

@@ -5,7 +5,7 @@ A row names a file that holds the input, or says how it is made: a step, a sine 
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -29,6 +29,7 @@ COLUMNS = (
     "name", "file", "kind", "amplitude", "frequency_Hz", "last_frequency_Hz",
     "duration_s",
 )  # fmt: skip
+_FREQUENCIES = ("frequency_Hz", "last_frequency_Hz")
 # A recording begins at rest for this share of it.
 _REST = 0.05
 # Samples of an input; a typing error in its duration must not fill the memory.
@@ -63,6 +64,7 @@ def read_plan(
         if name in {one.name for one in found}:
             _refuse(place, "name", name, "a name that no row before has")
         if row["file"]:
+            _refuse_others(place, row, ("name", "file"), "a row with a file")
             given = path.parent / row["file"]
             if not _is_file(given):
                 expected = "a file with the input of a recording that could be taken"
@@ -79,7 +81,12 @@ def _rows(path: Path) -> list[tuple[str, dict[str, str]]]:
     wanted = "expected a table with the columns name and file, or name, kind, amplitude"
     try:
         text = read_small_file(path).decode("utf-8-sig", errors="replace")
-        reader = csv.DictReader(io.StringIO(text, newline=""), restkey="")
+        first = text.partition("\n")[0]
+        # Spreadsheets of many countries write decimal commas between semicolons.
+        mark = max(",;\t", key=first.count)
+        reader = csv.DictReader(
+            io.StringIO(text, newline=""), restkey="", delimiter=mark
+        )
         names = [(one or "").strip() for one in reader.fieldnames or ()]
         rows = [(reader.line_num, row) for row in reader]
     except (OSError, csv.Error) as error:
@@ -149,11 +156,15 @@ def _made(place: str, row: Mapping[str, str], step_s: float) -> PlannedInput:
     if kind not in KINDS:
         expected = f"one of {', '.join(KINDS)}, or a file"
         _refuse(place, "kind", kind, expected)
+    _refuse_others(place, row, ("name", "kind", *KINDS[kind]), f"a {kind}")
     amplitude = _number(place, row, "amplitude")
     given = {name: _number(place, row, name) for name in KINDS[kind][1:]}
     for name, value in given.items():
         if value <= 0.0:
             _refuse(place, name, row[name], "a number > 0")
+        if name in _FREQUENCIES and value >= 0.5 / step_s:
+            expected = f"less than half the sample rate, {0.5 / step_s:g} Hz"
+            _refuse(place, name, row[name], expected)
     n = round(given["duration_s"] / step_s)
     if not 2 <= n <= _MOST_SAMPLES:
         expected = f"2 to {_MOST_SAMPLES} samples of {step_s:g} s"
@@ -173,9 +184,18 @@ def _made(place: str, row: Mapping[str, str], step_s: float) -> PlannedInput:
     return PlannedInput(row["name"], values, words)
 
 
+def _refuse_others(
+    place: str, row: Mapping[str, str], used: Sequence[str], what: str
+) -> None:
+    """Refuse a cell that says nothing of this row."""
+    for name, text in row.items():
+        if text and name not in used:
+            _refuse(place, name, text, f"an empty cell: {what} has none")
+
+
 def _number(place: str, row: Mapping[str, str], name: str) -> float:
     try:
-        value = float(row[name])
+        value = float(row[name].replace(",", "."))
     except ValueError:
         value = float("nan")
     if not abs(value) <= _LARGEST:

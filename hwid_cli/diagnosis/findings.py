@@ -29,6 +29,7 @@ from hwid_cli.diagnosis.sentences import (
     hardly_late,
     held_in_words,
     hidden_from_view,
+    imitated_in_words,
     law_in_words,
     left_out,
     summarise,
@@ -267,6 +268,10 @@ def _summary(
         text = summarise(problem, findings.criteria, base, verdict, effects, fits)
     else:
         text = law_in_words(findings.criteria, base, verdict, law, effects[0])
+    held_out = problem.part(held_out=True).signals
+    if effects and held_out:
+        given = _gap(findings.criteria, findings.given_sse).ratio_to_noise
+        text += imitated_in_words(given, findings.criteria.ratio(base))
     return text + held_in_words(problem)
 
 

@@ -54,6 +54,8 @@ _PROPORTIONAL = 3
 _SAME_FACTOR = 1.5
 # A ratio to the noise that is taken for 1, [-].
 _NO_MORE_THAN_NOISE = 1.02
+# Held-out error of the re-fitted base over that of the given one from which that is said.
+_CLEARLY_MORE = 1.5
 # A term that comes back in fewer of the resampled recordings is one of several, [-].
 _SURE_INCLUSION = 0.5
 # What is late by this near to half a sample may be a command that is held, [samples].
@@ -92,6 +94,22 @@ def held_in_words(problem: DiagnosisProblem) -> str:
     return (
         " The command is held between samples, as controllers do it: so simulated "
         "(simulation.hold: zero) it fits better than as a line."
+    )
+
+
+def imitated_in_words(given: float, refitted: float) -> str:
+    """Say that the re-fitted base leaves more than the given one, where it does.
+
+    Parameters
+    ----------
+    given, refitted : float, [-]
+        RMS that they leave of held-out recordings over that of the noise.
+    """
+    if not refitted > _CLEARLY_MORE * given:
+        return ""
+    return (
+        f" As given it is {given:.3g} times the noise: fitted again without an effect, the "
+        "parameters imitate what is missing in the other recordings, and fail in these."
     )
 
 

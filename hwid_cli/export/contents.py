@@ -25,7 +25,7 @@ from hwid_cli.records.recordings import Recording
 # Name of the physics simulation among the models.
 SIMULATION = "simulation"
 # Names in the form of the published tables begin so.
-_TITLE = "NLHW"
+TITLE = "NLHW"
 # Names that are listed where the asked one is not there.
 _LISTED = 3
 
@@ -49,7 +49,7 @@ def find_fit(
     """
     name = titles.get(asked, asked)
     if name not in named:
-        known = titles if asked.startswith(_TITLE) else named
+        known = titles if asked.startswith(TITLE) else named
         raise ConfigError(
             f"--model {asked}: no such model; {_near(asked, tuple(known))}"
         )

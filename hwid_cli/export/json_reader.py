@@ -98,6 +98,9 @@ def _model(path: Path, content: Mapping[str, Any], card: ModelCard) -> ExportedM
 
 
 def _trust(path: Path, given: Mapping[str, Any], n_parameters: int) -> ModelTrust:
+    if n_parameters and not given["steps"] and not given["reason"]:
+        expected = "the steps of the covariance, or a reason why there are none"
+        refuse(path, ("trust", "steps"), "none", expected)
     for row, step in enumerate(given["steps"]):
         if len(step) != n_parameters:
             expected = f"{n_parameters}, one a parameter"

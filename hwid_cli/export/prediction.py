@@ -14,6 +14,7 @@ from hwid_cli.errors import ConfigError, MeasurementError, MissingColumnError
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.exported import Exported, ModelCard
+from hwid_cli.records.next import PROPOSED_COLUMNS
 from hwid_cli.records.trust import Band
 
 # A time column may jitter by this share of a step, and differ so much in its mean step.
@@ -74,7 +75,13 @@ def read_input(
             f"{path}: no such file; expected measurements of the input; correct the path"
         )
     source = source or InputSource()
-    columns = _named_in(exported.card.columns, source)
+    columns, scale = _named_in(exported.card.columns, source), 1.0
+    time_column, input_column = PROPOSED_COLUMNS
+    is_other = source == InputSource() and columns.input != input_column
+    if is_other and _is_proposed(path):
+        # As `hwid next` writes it: in the unit that the model takes.
+        columns = Columns(input=input_column, output=input_column, time=time_column)
+        scale = exported.card.input_scale
     step = exported.sample_time_s
     # Nobody knows the output yet: the input's column stands in for it.
     wanted = Columns(
@@ -88,7 +95,7 @@ def read_input(
     except MissingColumnError as error:
         raise MeasurementError(f"{error}{_other_names(columns, source)}") from None
     _check_numbers(path, found.input)
-    values = _as_in_its_files(path, found.input, exported.card)
+    values = _as_in_its_files(path, found.input, exported.card) / scale
     if found.time is None:
         return step * np.arange(values.size), values
     n, time = found.input.values.size, _in_seconds(path, found.time, exported.card)
@@ -102,6 +109,16 @@ def read_input(
     _check_numbers(path, time)
     _check_steps(path, time, step)
     return time.values, values
+
+
+def _is_proposed(path: Path) -> bool:
+    """Whether a file holds an input that ``hwid next`` has proposed."""
+    try:
+        with path.open("rb") as file:
+            first = file.readline(_LONGEST_HEADER)
+    except OSError:
+        return False
+    return first.strip() == ",".join(PROPOSED_COLUMNS).encode()
 
 
 def _named_in(columns: Columns, source: InputSource) -> Columns:

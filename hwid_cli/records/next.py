@@ -15,6 +15,8 @@ from hwid_cli.records.rules import (
 )
 from hwid_cli.records.stored import ADDED_LATER
 
+# Columns of the file that a proposed input is written to.
+PROPOSED_COLUMNS = ("time_s", "input")
 GOALS = ("coverage", "parameters", "diagnosis")
 
 

@@ -9,6 +9,9 @@ from hwid_cli.records.units import behind
 from hwid_cli.report.formats import number, share_text
 from hwid_cli.report.table import Table, numbers, texts
 
+# Share of the samples beyond all values that were recorded from which that is told.
+_MUCH_BEYOND = 0.1
+
 # What the columns of the tables say.
 COLUMNS = (
     "value, rate, frequency: share of the samples at which the fit has seen the like. By "
@@ -23,11 +26,16 @@ def band_note(band: Band, unit: str) -> str:
     """Say how wide a band is, and how much of the prediction rests on data."""
     where = band.inside
     width = number(float(np.mean(band.upper - band.lower)))
+    beyond = 1.0 - float(where.amplitude.mean())
+    says_so = (
+        f"; at the {share_text(beyond)} of the samples whose values no recording of the "
+        "model had it is wider, but nobody has checked that it holds 90 % there"
+    )
     return (
         f"the band of 90 % is {width}{behind(unit)} wide on average; "
         f"{share_text(where.all.mean())} of the samples rest on data in every respect "
         f"(value {share_text(where.amplitude.mean())}, rate {share_text(where.rate.mean())}, frequency "
-        f"{share_text(where.frequency.mean())})"
+        f"{share_text(where.frequency.mean())}){says_so * (beyond >= _MUCH_BEYOND)}"
     )
 
 

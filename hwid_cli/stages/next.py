@@ -30,7 +30,7 @@ from hwid_cli.model.scores import rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.check import StagePlan
 from hwid_cli.records.experiment import Experiment, NextOptions, RecordingsOptions
-from hwid_cli.records.model import Fit
+from hwid_cli.records.model import Fit, HammersteinWiener
 from hwid_cli.records.next import (
     InputMap,
     NextRecordings,
@@ -69,12 +69,15 @@ from hwid_cli.tasks.task import one_thread
 from hwid_cli.trust.choice import chosen_by_gain, information_gain, information_of
 from hwid_cli.trust.content import content, joined, value_edges, visited_share
 from hwid_cli.trust.designs import LEAST_SAMPLES, designs
+from hwid_cli.trust.repeats import is_as_planned
 from hwid_cli.trust.visited import N_BANDS
 
 NAME = "next"
-STAGE_VERSION = 5
+STAGE_VERSION = 6
 # Share of the largest input up to which inputs of the other sign are noise.
 _OTHER_SIDE = 0.02
+# Times the largest recorded input beyond which an offered one is questioned.
+_FAR_OUTSIDE = 3.0
 # Hidden effects that a reason names.
 _NAMED_EFFECTS = 3
 
@@ -200,13 +203,23 @@ class _Choice:
     repeats: RepeatSpread | None = None
 
 
+def _visited(given: ToChoose, recordings: Sequence[Recording]) -> float:
+    """Share of what all recordings and inputs on offer visit that some recordings visit."""
+    everything = [one.input for one in given.recordings]
+    everything += [one.values for one in given.offered]
+    edges = value_edges(everything)
+    by_these = [content(one.input, edges) for one in recordings]
+    reachable = joined([content(one, edges) for one in everything])
+    return visited_share(joined(by_these), reachable) if by_these else 0.0
+
+
 def _for_coverage(given: ToChoose, _: Runner) -> _Choice:
     inputs = [one.input for one in given.recordings]
     edges = value_edges([*inputs, *(one.values for one in given.offered)])
     before = joined([content(one, edges) for one in inputs])
     tables = [content(one.values, edges) for one in given.offered]
     reachable = joined([before, *tables])
-    share = visited_share(before, reachable)
+    share = _visited(given, given.recordings)
 
     def gain(known: np.ndarray, more: np.ndarray) -> float:
         both = visited_share(joined([known, more]), reachable)
@@ -284,26 +297,60 @@ def _proposal(
     return ProposedRecording(one.name, one.words, one.values, gain, words, reason)
 
 
-def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
-    fit = given.fit
+def _information(
+    given: ToChoose, fit: Fit, recordings: Sequence[Recording]
+) -> tuple[np.ndarray, str]:
+    """What recordings tell of a model's parameters, and why they tell nothing, if so.
+
+    Those of the model have given the identity; others add what they would tell in a fit
+    together with these. What is kept for the test tells nothing.
+
+    Returns
+    -------
+    ndarray, shape (n_steps, n_steps), [-]
+    str
+    """
+    trust = trust_of(fit, given.recordings, given.tested)
+    model, known = _model_of(fit), np.eye(len(trust.steps))
+    for one in recordings:
+        if one.name not in (*fit.identified_on, *given.tested) and known.size:
+            known = known + information_of(model, trust, one.input)
+    return known, trust.reason
+
+
+def _model_of(fit: Fit | None) -> HammersteinWiener:
+    """The model of a fit, as it leaves the program."""
     if fit is None or fit.model is None:
         raise ValueError("this goal has a model")
-    trust = trust_of(fit, given.recordings, given.tested)
-    count = len(trust.steps)
-    words = "parameters that the model's recordings determine"
+    return outlined_model(fit.model)
+
+
+def _left_of_errors(known: np.ndarray) -> float:
+    """Standard errors over those that the model's own recordings leave, geometric mean."""
+    return float(np.exp(-0.5 * np.linalg.slogdet(known)[1] / len(known)))
+
+
+def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
+    fit = given.fit
+    model = _model_of(fit)
+    if fit is None:
+        raise ValueError("this goal has a model")
+    known, reason = _information(given, fit, given.recordings)
+    count = len(known)
+    own = " + ".join(fit.identified_on)
+    words = (
+        f"of the standard errors of the {count} parameters of {fit.name} that {own} alone "
+        "leaves are left"
+    )
     if not count:
-        sentence = (
-            f"the parameters of {fit.name} cannot be told ({trust.reason}); nothing is "
-            "proposed"
-        )
+        sentence = f"the parameters of {fit.name} cannot be told ({reason}); nothing is proposed"
         return _Choice(0.0, words, sentence, ())
-    model = outlined_model(fit.model)
-    more = [information_of(model, trust, one.values) for one in given.offered]
+    trust = trust_of(fit, given.recordings, given.tested)
     found = chosen_by_gain(
-        np.eye(count),
-        more,
+        known,
+        [information_of(model, trust, one.values) for one in given.offered],
         information_gain,
-        lambda known, one: known + one,
+        lambda before, one: before + one,
         given.options.number,
     )
     proposals, shrinks = [], []
@@ -319,11 +366,12 @@ def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
         )
         one = given.offered[place]
         proposals.append(_proposal(one, by, "log determinant", reason))
-    best = f"the best input on offer shrinks standard errors by {as_percent(max(shrinks), 1)}"
-    sentence = f"{count} {words} of {fit.name}; " + _verdict(
+    best = f"the best input on offer shrinks standard errors by {as_percent(max(shrinks, default=0.0), 1)}"
+    left = _left_of_errors(known)
+    sentence = f"{as_percent(left)} {words}; " + _verdict(
         len(proposals), best, given.options.enough
     )
-    return _Choice(float(count), words, sentence, tuple(proposals))
+    return _Choice(left, words, sentence, tuple(proposals))
 
 
 def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
@@ -442,20 +490,32 @@ def _shows(left: Sequence[HiddenEffect], place: int) -> str:
 
 
 def _changed(given: ToChoose, choice: _Choice) -> str:
-    """What the recordings since the last proposal changed."""
+    """What the recordings since the last proposal changed, by what is on offer now."""
     before = given.previous
     if before is None or before.goal != given.options.goal:
         return ""
     names = [one.name for one in given.recordings if one.name not in before.recordings]
     if not names:
-        return before.changed
+        is_same = len(given.recordings) == len(before.recordings)
+        return before.changed if is_same and before.known == choice.known else ""
     asked = {one.name for one in before.proposals}
     words = ", ".join(f"{name}{' (proposed)' * (name in asked)}" for name in names)
-    form = as_percent if given.options.goal == "coverage" else "{:g}".format
+    form = "{:g}".format if given.options.goal == "diagnosis" else as_percent
     return (
-        f"new since the last proposal: {words}; {form(before.known)} before, "
-        f"{form(choice.known)} now {choice.known_words}"
+        f"new since the last proposal: {words}; {form(_known_before(given, before))} "
+        f"before, {form(choice.known)} now {choice.known_words}"
     )
+
+
+def _known_before(given: ToChoose, before: NextRecordings) -> float:
+    """How much the recordings of the last proposal tell, by the measure of the goal."""
+    earlier = [one for one in given.recordings if one.name in before.recordings]
+    if given.options.goal == "coverage":
+        return _visited(given, earlier)
+    if given.options.goal == "parameters" and given.fit is not None:
+        known, _ = _information(given, given.fit, earlier)
+        return _left_of_errors(known) if known.size else 0.0
+    return before.known
 
 
 def _input_map(given: ToChoose, proposed: Sequence[np.ndarray]) -> InputMap:
@@ -554,19 +614,52 @@ def _usual_sign(recordings: Sequence[Recording]) -> int:
 
 
 def _warnings(context: Context, given: ToChoose) -> list[str]:
-    """Designed inputs that have a sign which no recording has had."""
+    """What is odd about inputs on offer, and about recordings of planned ones."""
+    said = [*_other_inputs(given), *_far_outside(given)]
     limits, recordings = given.options.limits, given.recordings
     if limits is None or limits.one_sided:
-        return []
+        return said
     sign = _usual_sign(recordings)
     largest = max(float((sign * one.input).max()) for one in recordings)
     lowest = min(float((sign * one.input).min()) for one in recordings)
     if lowest < -_OTHER_SIDE * largest:
-        return []
+        return said
     word = "negative" if sign > 0 else "positive"
     return [
+        *said,
         f"no recording has a {word} input, but designed ones may: where there is none, "
-        f"as of a heater, put one_sided: true into next.limits of {context.experiment.source}"
+        f"as of a heater, put one_sided: true into next.limits of {context.experiment.source}",
+    ]
+
+
+def _other_inputs(given: ToChoose) -> list[str]:
+    """Recordings that have the name of an offered input, and another input."""
+    planned = {one.name: one for one in given.plan}
+    return [
+        f"{one.name}: its input is not what was to be played under this name "
+        f"({planned[one.name].words}); it counts as what was measured: record it again, "
+        "or give it another name"
+        for one in given.recordings
+        if one.name in planned
+        and not is_as_planned(one.input, planned[one.name].values)
+    ]
+
+
+def _far_outside(given: ToChoose) -> list[str]:
+    """That inputs of a plan are far larger than any that was recorded, if so."""
+    largest = max(float(np.abs(one.input).max()) for one in given.recordings)
+    sizes = {one.name: float(np.abs(one.values).max()) for one in given.offered}
+    far = [name for name, size in sizes.items() if size > _FAR_OUTSIDE * largest]
+    if not far or given.options.plan is None:
+        return []
+    worst, unit = (
+        max(far, key=sizes.__getitem__),
+        behind(given.recordings[0].input_unit),
+    )
+    return [
+        f"{counted(len(far), 'input')} of the plan are far larger than all recorded ones: "
+        f"{worst} reaches {sizes[worst]:g}{unit}, recordings {largest:g}{unit}; make sure "
+        "that the machine bears it"
     ]
 
 

@@ -23,6 +23,7 @@ from hwid_cli.records.units import behind
 from hwid_cli.trust.content import content, joined, value_edges, visited_share
 from hwid_cli.trust.repeats import (
     LEAST_NARROWING,
+    is_as_planned,
     is_same_input,
     repeat_spread,
     same_inputs,
@@ -109,15 +110,15 @@ def _groups(
     """Recordings by their input, the one that visits most first."""
     known = {one.name: one.input for one in recordings}
     known |= {one.name: one.values for one in plan}
-
-    def command(name: str) -> np.ndarray:
-        said = _NAME.fullmatch(name)
-        if name not in planned and said and said["first"] in known:
-            return known[said["first"]]
-        return known[name]
-
     planned = {one.name for one in plan}
-    commands = [command(one.name) for one in recordings]
+
+    def command(one: Recording) -> np.ndarray:
+        said, name = _NAME.fullmatch(one.name), one.name
+        if name not in planned and said and said["first"] in known:
+            name = said["first"]
+        return known[name] if is_as_planned(one.input, known[name]) else one.input
+
+    commands = [command(one) for one in recordings]
     groups = [
         _Repeated(commands[places[0]], tuple(recordings[place] for place in places))
         for places in same_inputs(commands)

@@ -7,7 +7,7 @@ from pathlib import Path
 from hwid_cli.errors import CacheError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.csv_tables import write_table_csv
-from hwid_cli.records.next import NextRecordings, ProposedRecording
+from hwid_cli.records.next import PROPOSED_COLUMNS, NextRecordings, ProposedRecording
 from hwid_cli.store.hdf5_records import read_record, write_record
 from hwid_cli.store.result_files import (
     Provenance,
@@ -128,4 +128,4 @@ def write_next_files(out: Path, found: NextRecordings) -> None:
 def _write_input(path: Path, one: ProposedRecording, sample_time_s: float) -> None:
     times = (round(k * sample_time_s, _TIME_DIGITS) for k in range(one.values.size))
     rows = zip(times, one.values.tolist(), strict=True)
-    write_table_csv(path, ("time_s", "input"), rows)
+    write_table_csv(path, PROPOSED_COLUMNS, rows)

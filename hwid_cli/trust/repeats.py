@@ -31,6 +31,9 @@ from hwid_cli.trust.judged import COVERAGE
 # Inputs that differ by less than this share of their largest value are repeats.
 _SAME_INPUT = 0.02
 _SAME_LENGTH = 2
+# A measured input is a planned one that is off by this share of it at most, on the lines of
+# the spectrum that hold this share of its energy, late by this share of its length.
+_AS_PLANNED, _HELD, _LATE = 0.3, 0.95, 0.02
 # Share of its width by which the band has to shrink for a repeat to be worth taking.
 LEAST_NARROWING = 0.1
 
@@ -47,6 +50,34 @@ def is_same_input(one: np.ndarray, other: np.ndarray) -> bool:
     length = min(one.size, other.size)
     a, b = one[:length], other[:length]
     return float(np.max(np.abs(a - b))) < _SAME_INPUT * float(np.max(np.abs(a)))
+
+
+def is_as_planned(measured: np.ndarray, planned: np.ndarray) -> bool:
+    """Whether a measured input is a planned one, late by a little and however noisy.
+
+    Compared are the lines of the spectrum that hold what was planned: noise lies on all.
+
+    Parameters
+    ----------
+    measured, planned : ndarray, shape (n_samples,), [input unit]
+        Of lengths that may differ.
+
+    Examples
+    --------
+    >>> sine = np.sin(0.1 * np.arange(1000))
+    >>> is_as_planned(sine[:900], sine), is_as_planned(np.ones(1000), sine)
+    (True, False)
+    """
+    length = min(measured.size, planned.size)
+    spectra = np.fft.rfft([measured[:length], planned[:length]], axis=1)
+    sizes = np.abs(spectra[1]) ** 2
+    order = np.argsort(-sizes)
+    n_lines = int(np.searchsorted(np.cumsum(sizes[order]), _HELD * sizes.sum())) + 1
+    lines = order[:n_lines]
+    late = np.arange(-int(_LATE * length), int(_LATE * length) + 1)
+    turns = np.exp(-2j * np.pi * np.outer(late, lines) / length)
+    off = np.abs(spectra[0, lines] - spectra[1, lines] * turns) ** 2
+    return bool(off.sum(axis=1).min() <= _AS_PLANNED**2 * sizes[lines].sum())
 
 
 def same_inputs(inputs: Sequence[np.ndarray]) -> list[list[int]]:

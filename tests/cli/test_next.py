@@ -220,6 +220,59 @@ def test_parameters_ask_for_a_recording_that_excites_them(bench):
     assert "standard errors" in proposals(bench)[0]["reason"]
 
 
+@pytest.mark.thorough
+def test_what_other_recordings_tell_of_parameters_counts(bench):
+    (bench / "plan.csv").write_text(
+        "name,kind,amplitude,frequency_Hz,duration_s\none,sine,1,3,4\ntwo,sine,1,3,4\n"
+    )
+    asked = "identify:\nnext: {plan: plan.csv, goal: parameters, number: 1}\n"
+    assert run(bench, asked).exit_code == 0
+    (first,) = proposals(bench)
+    before = json.loads((bench / "out" / "next.json").read_text())["known"]
+    measure(bench / "raw", first["name"], played(bench, first)[:, 1])
+
+    said = run(bench, asked)
+
+    assert said.exit_code == 0, said.output
+    (second,) = proposals(bench)
+    now = json.loads((bench / "out" / "next.json").read_text())["known"]
+    assert now < before
+    # The second of two equal sines tells less than the first.
+    assert float(second["gain"]) < float(first["gain"])
+    assert f"{first['name']} (proposed)" in flat(said.output)
+
+
+def test_what_changed_counts_what_is_there_now(bench):
+    run(bench, LIMITS)
+    row = proposals(bench)[0]
+    measure(bench / "raw", row["name"], played(bench, row)[:, 1])
+    said = flat(run(bench, LIMITS).output)
+    assert f"New since the last proposal: {row['name']} (proposed)" in said
+    (bench / "raw" / f"{row['name']}.csv").unlink()
+
+    again = run(bench, LIMITS)
+
+    assert "New since the last proposal" not in flat(again.output)
+
+
+def test_another_input_under_a_planned_name_is_said(bench):
+    run(bench, LIMITS)
+    row = proposals(bench)[0]
+    measure(bench / "raw", row["name"], 0.5 * (np.arange(N) > N // 20))
+
+    said = run(bench, LIMITS)
+
+    assert f"{row['name']}: its input is not what was to be played" in flat(said.stderr)
+
+
+def test_inputs_far_beyond_what_was_recorded_are_questioned(bench):
+    (bench / "plan.csv").write_text("name,kind,amplitude,duration_s\nbig,step,500,4\n")
+
+    said = run(bench, "next: {plan: plan.csv}\n")
+
+    assert "big reaches 500 A, recordings 0.5 A" in flat(said.stderr)
+
+
 DIAGNOSIS = """name: bench
 recordings:
   files: raw/*.csv

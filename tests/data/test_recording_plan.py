@@ -37,6 +37,17 @@ def test_a_row_is_a_file_or_says_how_it_is_made(tmp_path):
     assert np.sum(crossings > 47) > 2 * np.sum(crossings <= 47)
 
 
+def test_spreadsheets_may_write_decimal_commas(tmp_path):
+    text = "name,kind,amplitude,duration_s\nb,step,2.5,1\n"
+    other = text.replace(",", ";").replace("2.5", "2,5")
+
+    (one,) = read_plan(plan(tmp_path, text), OPTIONS, 0.01)
+    (same,) = read_plan(plan(tmp_path, other), OPTIONS, 0.01)
+
+    assert np.array_equal(one.values, same.values)
+    assert one.values.max() == 2.5
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -56,13 +67,20 @@ def test_a_row_is_a_file_or_says_how_it_is_made(tmp_path):
         ("name,file\na,huge.csv\n", "huge.csv: its input holds .* beyond 1e"),
         ("name,kind,amplitude,duration_s\na,step,1e308,1\n", "a finite number up to"),
         ("name,kind,amplitude,duration_s\na,step,nan,1\n", "amplitude: found 'nan'"),
+        ("name,kind,amplitude,frequency_Hz,duration_s\na,sine,1,50,1\n",
+         "frequency_Hz: found '50'; expected less than half the sample rate, 50 Hz"),
+        ("name,kind,amplitude,frequency_Hz,duration_s\na,step,1,5,1\n",
+         "frequency_Hz: found '5'; expected an empty cell: a step has none"),
+        ("name,file,amplitude\na,a.csv,1\n",
+         "amplitude: found '1'; expected an empty cell: a row with a file has none"),
         (
             "name,kind,amplitude,duration_s\na,step,1,1\na,step,2,1\n",
             "row 3: name: found 'a'; expected a name that no row before has",
         ),
     ],
-)
+)  # fmt: skip
 def test_a_plan_that_cannot_be_used_is_refused_in_one_line(tmp_path, text, said):
+    (tmp_path / "a.csv").write_text("t,u\n0,1\n0.01,2\n")
     (tmp_path / "huge.csv").write_text("t,u\n0,1\n0.01,1e200\n")
     with pytest.raises(MeasurementError, match=said) as refused:
         read_plan(plan(tmp_path, text), OPTIONS, 0.01)

@@ -97,6 +97,7 @@ def test_what_is_known_of_errors_comes_back_bit_by_bit(tmp_path):
             [1.0],
             r"trust.steps\[1\]: found 1 numbers; expected .*, one a p",
         ),
+        (("steps",), [], r"trust.steps: found none; expected the steps of the cov"),
         (("scale",), 0.0, r"trust.scale: found 0.0; expected a finite number above 0"),
         (("visited", "inner", "edges", 1), 9e9, "inner.edges: .* numbers that rise"),
         (("visited", "input", "lowest_rate"), [1.0], "found 1 numbers; expected 32"),
@@ -109,6 +110,7 @@ def test_damaged_knowledge_of_errors_is_refused(keys, value, said, tmp_path):
     for key in keys[:-1]:
         place = place[key]
     place[keys[-1]] = value
+    content["trust"]["reason"] = ""
     path.write_text(json.dumps(content))
 
     with pytest.raises(ModelFileError, match=said):

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import t
 
-from hwid_cli.trust.repeats import repeat_spread, same_inputs, with_repeats
+from hwid_cli.trust.repeats import (
+    is_as_planned,
+    repeat_spread,
+    same_inputs,
+    with_repeats,
+)
 
 N = 500
 SHAPE = np.sin(np.arange(N) / 30.0)
@@ -85,3 +90,29 @@ def test_inputs_of_another_size_length_or_none_at_all_are_no_repeats():
     inputs = [SHAPE, 1.03 * SHAPE, SHAPE[:-3], 1.01 * SHAPE[:-1], 0 * SHAPE, 0 * SHAPE]
 
     assert same_inputs(inputs) == [[0, 3], [1], [2], [4], [5]]
+
+
+def test_a_measured_input_is_a_planned_one_however_noisy_and_a_little_late():
+    rng = np.random.default_rng(4)
+    step = np.where(np.arange(2000) < 100, 0.0, 3.0)
+    noise = 6.0 * rng.standard_normal(2000)
+
+    assert is_as_planned(step + noise, step)
+    assert is_as_planned(np.roll(step, 20), step)
+    assert is_as_planned(step[:1900], step)
+
+
+@pytest.mark.parametrize("factor", [0.4, 1.6, -1.0])
+def test_another_level_is_another_input(factor):
+    step = np.where(np.arange(2000) < 100, 0.0, 3.0)
+
+    assert not is_as_planned(factor * step, step)
+
+
+def test_another_shape_is_another_input():
+    time = np.arange(2000)
+    sweep = 3.0 * np.sin(1e-5 * time**2)
+
+    assert not is_as_planned(np.where(time < 100, 0.0, 3.0), sweep)
+    assert not is_as_planned(sweep[::-1], sweep)
+    assert not is_as_planned(np.zeros(2000), sweep)
