@@ -8,9 +8,14 @@ from dataclasses import replace
 from hwid_cli.diagnosis.candidate import rebuilt, without_owner
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.parameters import residuals_at, sum_of_squares
-from hwid_cli.diagnosis.selection import LEAST_EXPLAINED, LEAST_LAST_CONTRIBUTION
+from hwid_cli.diagnosis.selection import (
+    LEAST_EXPLAINED,
+    LEAST_LAST_CONTRIBUTION,
+    WITHIN_REACH,
+)
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
+from hwid_cli.diagnosis.through_runs import followed
 from hwid_cli.diagnosis.turns import Turn, fit_of_run, is_as_good
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
@@ -45,6 +50,8 @@ def confirm(
     best = settled(findings, chosen, runs, values)
     if best is None:
         return unconfirmed(findings), values, False
+    if not findings.criteria.is_complete(fit_of_run(findings, best)):
+        best = followed(findings, best, runs)
     best = _without_idle(findings, best, runs)
     found, criteria = _with_run(findings, best), findings.criteria
     run = found.verdict.chosen
@@ -52,8 +59,34 @@ def confirm(
     may_be_named = not (criteria.replaces(run) or criteria.imitates_one_law(run))
     may_be_named = may_be_named and _explains(findings, run)
     if is_enough and may_be_named:
-        return found, best.values_of_run, True
+        return _beside_rivals(findings, found, best, runs), best.values_of_run, True
     return unconfirmed(findings), best.values_of_run, False
+
+
+def _beside_rivals(
+    findings: Findings, found: Findings, best: Turn, runs: Runs
+) -> Findings:
+    """Findings whose rivals are those that leave about as little in the simulation, too.
+
+    A stand-in that errs cannot tell them apart.
+
+    Parameters
+    ----------
+    findings, found : Findings
+        Of the stand-in, and of the simulation's own run.
+    """
+    verdict, criteria = found.verdict, findings.criteria
+    if not verdict.rivals:
+        return found
+    most = WITHIN_REACH * criteria.excess(verdict.chosen)
+    left = float(best.sse.sum())
+    rivals = []
+    for one in verdict.rivals:
+        turn = settled(findings, one, runs, best.values_of_run, left)
+        if turn is not None and criteria.excess(fit_of_run(found, turn)) <= most:
+            rivals.append(one)
+    word = "ambiguous" if rivals else "named"
+    return replace(found, verdict=replace(verdict, word=word, rivals=tuple(rivals)))
 
 
 def _explains(findings: Findings, run: CandidateFit) -> bool:

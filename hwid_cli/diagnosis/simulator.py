@@ -157,6 +157,10 @@ class CountedRuns:
         """The same, spent after a share of all runs; what it runs counts here, too."""
         return CountedRuns(self, share * self._most - self.count)
 
+    def at_least(self, number: int) -> "CountedRuns":
+        """The same with so many runs left at least."""
+        return CountedRuns(self, max(self._most - self.count, number))
+
     def told(self, on_round: OnRound) -> OnRound:
         """What begins, with the runs until then."""
 

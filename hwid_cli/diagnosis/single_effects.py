@@ -34,6 +34,7 @@ from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import acts_at_port, changes_input
 from hwid_cli.diagnosis.tasks import OnRound
+from hwid_cli.diagnosis.through_runs import MOST_LEFT, followed
 from hwid_cli.diagnosis.turns import Turn, best_turn, fit_of_run
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
@@ -56,6 +57,8 @@ _CLEARLY_LESS = 0.5
 _MOST_BY_RUNS, _MOST_OF_GAP, _WORTH_WAITING = 2, 0.25, 2.0
 # A run that leaves little more than noise may turn on after the others have used up theirs.
 _TO_SETTLE = 1.5
+# Times the noise that a run leaves at most to be followed before others are tried.
+_NEARLY = 3.0
 # Mean square over the noise's beside which no further one is begun, unless runs have called
 # it likely by nearly the same share.
 _NEXT_TO_NOISE, _ALIKE = 2.0, 2.0
@@ -117,7 +120,7 @@ def single_in_simulation(
         tried.keep(found)
     _try_likely(tried, likely, runs, values, on_round)
     tried.keep(_at_ports_later(tried, runs))
-    tried.keep(_turned_on(tried, runs))
+    _follow(tried, runs, at_most=MOST_LEFT)
     tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
     decided = decided_by_runs(findings, tried.turns, tried.fits)
     if decided is not None:
@@ -140,6 +143,8 @@ class _Tried:
         self.through_runs: set[tuple[str, ...]] = set()
         self.at_ports = AtPorts()
         self.later: list[PortStart] = []
+        # Whose runs were followed to their end.
+        self.followed: set[tuple[str, ...]] = set()
 
     def is_told_by_ports(self, one: CandidateFit) -> bool:
         """Whether runs leave nothing with another effect at a port, and much with this one."""
@@ -190,6 +195,7 @@ def _try_likely(
         what = f"{what}, {public_id(effect)}"
         on_round(with_best_so_far(what, findings.criteria, fits, findings.base), 0)
         tried.keep(_in_simulation(tried, one, runs, values))
+        _follow(tried, runs, at_most=_NEARLY)
 
 
 def _in_simulation(
@@ -211,21 +217,31 @@ def _in_simulation(
     return found if turn is None else [*found, turn]
 
 
-def _turned_on(tried: _Tried, runs: Runs) -> list[Turn]:
-    """Further turns of the run that leaves least, where that is little more than noise.
+def _follow(tried: _Tried, runs: Runs, *, at_most: float) -> None:
+    """Follow the run that leaves least to its end, once, where that is more than noise.
 
     Its turns may have ended before they had settled; what it leaves then makes a law look
     no better than its limit case.
+
+    Parameters
+    ----------
+    at_most : float, [-]
+        Times the noise that it leaves, beyond which something else is missing.
     """
     turns, criteria = list(tried.turns.values()), tried.findings.criteria
     if not turns:
-        return []
+        return
     best = min(turns, key=lambda turn: float(turn.sse.sum()))
     fit = fit_of_run(tried.findings, best)
-    if criteria.leaves_noise(fit) or criteria.ratio(fit) > STILL_LARGE:
-        return []
-    further = best_turn(tried.findings, best, runs.up_to(_TO_SETTLE))
-    return [further] if further.sse.sum() < best.sse.sum() else []
+    if fit.effects in tried.followed or criteria.ratio(fit) > at_most:
+        return
+    tried.followed.add(fit.effects)
+    allowed = runs.up_to(_TO_SETTLE)
+    further = followed(tried.findings, best, allowed, at_most=at_most)
+    may_turn = not criteria.leaves_noise(fit) and criteria.ratio(fit) <= STILL_LARGE
+    if further is best and may_turn:
+        further = best_turn(tried.findings, best, allowed)
+    tried.keep([further])
 
 
 def _twins_in_simulation(

@@ -225,39 +225,66 @@ def is_as_good(turn: Turn) -> bool:
     return float(turn.sse.sum()) <= _NO_WORSE * turn.said
 
 
-def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
-    """Run the simulation with the effect's force; correct the stand-in; fit again."""
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What the simulation's runs with an effect's forces gave, and the turn after them.
+
+    Parameters
+    ----------
+    turn : Turn
+        With the stand-in corrected by the runs, and the fit as it was.
+    found : list of SimulatorRun
+    forces : list of ndarray, shape (n_samples,), [N]
+        Along the stand-in's motions, that the runs were made with.
+    """
+
+    turn: Turn
+    found: list[SimulatorRun]
+    forces: list[np.ndarray]
+
+
+def answered(findings: Findings, turn: Turn, runs: Runs) -> Answer | None:
+    """Run the simulation with the effect's force, and correct the stand-in.
+
+    None where a force is not finite, or a run gives no answer.
+    """
     problem = turn.problem
     motions = simulate_at(problem, *rebuilt(problem, turn.fit, findings.scales))
     forces = forces_along(problem, motions)
     if not all(np.isfinite(one).all() for one in forces):
         return None
     sent = as_sent(runs, problem, forces, at_force=turn.at_force)
-    push = partial(pushed, runs, problem, sent, turn.at_force)
-    found = push(turn.values)
+    found = pushed(runs, problem, sent, turn.at_force, turn.values)
     if found is None:
         return None
     late = _late(problem, motions, found)
     problem = _with_starts(problem, found)
     corrected = _corrected(problem, late, [run.output for run in found], forces)
     fit = where_it_starts(corrected, turn.fit)
-    following = Turn(
+    following = replace(
+        turn,
         problem=corrected,
         fit=fit,
-        values=turn.values,
-        said=turn.said,
-        at_force=turn.at_force,
-        rival=turn.rival,
-        slopes=turn.slopes,
-        slopes_at=turn.slopes_at,
         tried=(fit, turn.values),
         left=_left(problem, motions, found),
         disagreement=_rms_of(problem, late),
     )
-    if not problem.known:
-        return replace(following, fit=fitted_again(corrected, fit, findings))
+    return Answer(following, found, forces)
+
+
+def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
+    """Run the simulation with the effect's force; correct the stand-in; fit again."""
+    answer = answered(findings, turn, runs)
+    if answer is None:
+        return None
+    following, found, forces = answer.turn, answer.found, answer.forces
+    if not turn.problem.known:
+        fit = fitted_again(following.problem, following.fit, findings)
+        return replace(following, fit=fit)
     if not turn.slopes or have_moved(turn.slopes_at, turn.values, _SAME_SLOPES):
-        rms = findings.criteria.noise.rms
+        problem, rms = following.problem, findings.criteria.noise.rms
+        sent = as_sent(runs, problem, forces, at_force=turn.at_force)
+        push = partial(pushed, runs, problem, sent, turn.at_force)
         slopes = tuple(_slopes(runs, push, turn.values, found, rms))
         following = replace(following, slopes=slopes, slopes_at=turn.values)
     return _with_values(following, (found, forces), runs, findings)

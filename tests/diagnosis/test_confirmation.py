@@ -41,10 +41,14 @@ def test_what_was_found_is_a_fact_where_its_own_run_bears_it_out(
     monkeypatch.setattr(confirmation, "settled", lambda *_: turn)
     monkeypatch.setattr(confirmation, "is_as_good", lambda _: True)
     monkeypatch.setattr(confirmation, "_without_idle", lambda _, best, __: best)
+    monkeypatch.setattr(confirmation, "followed", lambda _, best, __: best)
+    monkeypatch.setattr(confirmation, "fit_of_run", lambda *_: run)
     monkeypatch.setattr(
         confirmation,
         "_with_run",
-        lambda *_: SimpleNamespace(verdict=SimpleNamespace(chosen=run)),
+        lambda *_: SimpleNamespace(
+            verdict=SimpleNamespace(chosen=run, rivals=()), criteria=CRITERIA
+        ),
     )
     runs = SimpleNamespace(simulator=SimpleNamespace(run=print))
     found, _, is_confirmed = confirmation.confirm(findings, runs, {})
@@ -117,3 +121,27 @@ def test_what_hardly_acts_in_the_run_is_no_effect(
     monkeypatch.setattr(confirmation, "_acts_by", acts)
     found = confirmation._without_idle(findings, turn_of(made_up(pair, 100.0)), runs)
     assert found.fit.effects == remain
+
+
+@pytest.mark.parametrize(
+    ("left", "word"), [(140.0, "ambiguous"), (900.0, "named"), (None, "named")]
+)
+def test_rivals_are_those_that_leave_as_little_in_the_simulation(
+    monkeypatch, left, word
+):
+    """A stand-in that errs takes both for as good; runs say which one is."""
+    chosen, rival = made_up(FRICTION, 135.0), made_up(("hysteresis",), 135.0)
+    whole = base(600_000.0)
+    findings = Findings(
+        problem=None, criteria=CRITERIA, scales=None, given_sse=whole.sse, base=whole,
+        before=[], force=[], where=(), found=None,
+        verdict=DiagnosisVerdict("ambiguous", False, chosen, (rival,)),
+    )  # fmt: skip
+    turn = None if left is None else SimpleNamespace(fit=made_up(("hysteresis",), left))
+    monkeypatch.setattr(confirmation, "settled", lambda *_: turn)
+    monkeypatch.setattr(confirmation, "fit_of_run", lambda _, turn: turn.fit)
+    best = SimpleNamespace(values_of_run={}, sse=chosen.sse)
+    found = confirmation._beside_rivals(findings, findings, best, None)
+
+    assert found.verdict.word == word
+    assert bool(found.verdict.rivals) is (word == "ambiguous")

@@ -452,9 +452,13 @@ def test_a_run_near_the_noise_turns_on(monkeypatch, sse, whiteness, turns_on):
         return SimpleNamespace(fit=near, sse=turn.sse - 1.0)
 
     monkeypatch.setattr(single_effects, "best_turn", best_turn)
+    monkeypatch.setattr(single_effects, "followed", lambda _, turn, *__, **___: turn)
     monkeypatch.setattr(single_effects, "fit_of_run", lambda _, turn: turn.fit)
     findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0))
     tried = single_effects._Tried(findings)
     tried.keep([SimpleNamespace(fit=near, sse=near.sse)])
-    found = single_effects._turned_on(tried, SimpleNamespace(up_to=lambda _: None))
-    assert bool(found) is bool(asked) is turns_on
+    runs = SimpleNamespace(up_to=lambda _: None)
+    for _ in range(2):
+        # Once is enough.
+        single_effects._follow(tried, runs, at_most=10.0)
+    assert len(asked) == turns_on
