@@ -129,14 +129,13 @@ def plants(
     count: int, first: int, keep: Path | None, moving: float | None
 ) -> dict[str, list[Row]]:
     """Random plants, right and wrong structure in turn; the rows of each line."""
-    wrong = STRUCTURES[1:]
     known = {}
     if keep is not None and keep.is_file():
         lines = [json.loads(one) for one in keep.read_text().splitlines()]
         known = {one["seed"]: one["rows"] for one in lines}
     found: dict[str, list[Row]] = {}
     for number in range(count):
-        structure = "right" if number % 2 == 0 else wrong[number // 2 % len(wrong)]
+        structure = structure_of(number)
         seed = first + number
         if seed not in known:
             known[seed] = plant(seed, structure, moving)
@@ -156,6 +155,45 @@ def plants(
                 f"{np.mean(coverage == 1.0):.0%} hold every sample"
             )
     return found
+
+
+def joint(count: int, first: int) -> dict[str, list[Row]]:
+    """Models of five recordings of two kinds together, judged by leaving each out."""
+    found: dict[str, list[Row]] = {}
+    for number in range(count):
+        structure = structure_of(number)
+        seed = first + number
+        rng = np.random.default_rng(seed)
+        one, two, three = (str(kind) for kind in rng.permutation(INPUTS)[:3])
+        recordings = plant_recordings(
+            seed, structure, [one] * 5 + [two] * 4 + [three] * 2
+        )
+        own = [*recordings[:3], *recordings[5:7]]
+        options = FitOptions(units=int(rng.choice([5, 10])))
+        model = fit(own, ORDERS, options)
+        if model.model is None:
+            continue
+        word = "right" if structure == "right" else "wrong"
+        tests = {"same": [*recordings[3:5], *recordings[7:9]], "other": recordings[9:]}
+        known = calibrated(own_trust(model, own), left_out(model, own))
+        for kind, unseen in tests.items():
+            for test in unseen:
+                rows = row_of(known, judgement(model.model, known, test))
+                found.setdefault(f"{word}, {kind}", []).extend(rows)
+    return found
+
+
+def show_joint(count: int, first: int) -> None:
+    """The table of models of five recordings."""
+    print(f"\n{count} random plants, models of five recordings\n{HEAD}")
+    for name, rows in joint(count, first).items():
+        show(name, rows)
+
+
+def structure_of(number: int) -> str:
+    """Right and wrong structures in turn."""
+    wrong = STRUCTURES[1:]
+    return "right" if number % 2 == 0 else wrong[number // 2 % len(wrong)]
 
 
 def show_chance(who: str, count: int, plants_of: dict[str, list[Row]]) -> None:
@@ -319,12 +357,14 @@ def main() -> None:
     parser.add_argument("--choose", action="store_true")
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--moving", type=float, metavar="DRIFT")
-    parser.add_argument("--only", choices=["plants", "real", "gun"])
+    parser.add_argument("--only", choices=["plants", "joint", "real", "gun"])
     chosen = parser.parse_args()
     found: dict[str, list[Row]] = {}
     if chosen.only in (None, "plants"):
         first = CHOOSING if chosen.choose else REPORTING
         found = plants(chosen.plants, first, chosen.keep, chosen.moving)
+    if chosen.only in (None, "joint"):
+        show_joint(chosen.plants // 2, CHOOSING if chosen.choose else REPORTING)
     if chosen.only in (None, "real"):
         print(f"\nmeasured\n{HEAD}")
         if folder().is_dir():

@@ -112,7 +112,7 @@ def test_no_step_where_none_is_worth_it(begun):
 
     assert fitted_through_runs(findings, turn, runs) is None
     # One set of derivatives says so.
-    assert program.count < 25
+    assert program.count < 10
 
 
 def test_nor_once_the_runs_are_spent(begun):
