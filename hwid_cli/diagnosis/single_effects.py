@@ -237,7 +237,11 @@ def _follow(tried: _Tried, runs: Runs, *, at_most: float) -> None:
         return
     tried.followed.add(fit.effects)
     allowed = runs.up_to(_TO_SETTLE)
-    further = followed(tried.findings, best, allowed, at_most=at_most)
+    # At ports the fit was one through runs.
+    is_exact = fit.effects in tried.through_runs and acts_at_port(fit.effects)
+    further = best
+    if not is_exact:
+        further = followed(tried.findings, best, allowed, at_most=at_most)
     may_turn = not criteria.leaves_noise(fit) and criteria.ratio(fit) <= STILL_LARGE
     if further is best and may_turn:
         further = best_turn(tried.findings, best, allowed)

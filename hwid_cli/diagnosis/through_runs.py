@@ -79,10 +79,12 @@ def followed(
     at_most : float, [-]
         Times the noise that it leaves, beyond which something else is missing.
     """
-    ratio = findings.criteria.ratio(fit_of_run(findings, turn))
-    if not turn.fit.effects or ratio > at_most:
+    criteria, fit = findings.criteria, fit_of_run(findings, turn)
+    if not turn.fit.effects or criteria.ratio(fit) > at_most:
         return turn
-    room = replace(runs, run_tasks=runs.run_tasks.at_least(_LEAST_ROOM))
+    # Where nothing but noise is left, a valley is worth no more than the runs that are left.
+    least = 0 if criteria.is_complete(fit) else _LEAST_ROOM
+    room = replace(runs, run_tasks=runs.run_tasks.at_least(least))
     return fitted_through_runs(findings, turn, room) or turn
 
 

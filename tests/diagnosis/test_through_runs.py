@@ -68,7 +68,9 @@ def begun(monkeypatch):
         findings = SimpleNamespace(
             scales=scales_of_recordings(given, speeds),
             criteria=SimpleNamespace(
-                noise=SimpleNamespace(rms=NOISE), ratio=lambda _: 2.0
+                noise=SimpleNamespace(rms=NOISE),
+                ratio=lambda _: 2.0,
+                is_complete=lambda _: False,
             ),
         )
         free = {"mass": FreeParameter(0.3, (0.05, 3.0))}
