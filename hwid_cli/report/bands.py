@@ -18,6 +18,8 @@ from hwid_cli.report.charts import (
 _MOST_SPANS = 60
 # Curves of this label are hidden together.
 BAND = "90 % band"
+# The strip: 1 where all of the samples rest on data.
+SHARE = "rests on data"
 
 
 def band_chart(shown: ShownBand, sentence: str) -> Chart:
@@ -32,12 +34,13 @@ def band_chart(shown: ShownBand, sentence: str) -> Chart:
     -------
     Chart
         The prediction above, what is left of the measurement beneath, where a narrow band
-        is seen; shaded where the prediction rests on data in every respect.
+        is seen, and a strip; shaded where the prediction rests on data in every respect.
     """
     chosen = thinning(shown.time_s.size, MOST_POINTS, (0, 0))
     spans = _stretches(shown.time_s, shown.is_inside)
     parts = (shown.measured, shown.output, shown.lower, shown.upper)
     measured, output, lower, upper = (thinned(one, chosen) for one in parts)
+    on_data = thinned(shown.is_inside.astype(float), chosen)
     residual, below, above = (
         thinned(one - shown.output, chosen)
         for one in (shown.measured, shown.lower, shown.upper)
@@ -63,8 +66,13 @@ def band_chart(shown: ShownBand, sentence: str) -> Chart:
             lines=(0.0,),
             spans=spans,
         ),
+        Panel(
+            "on data",
+            (Curve(SHARE, np.zeros(on_data.size), "map", "band", upper=on_data),),
+            height_px=48,
+        ),
     )
-    where = "Shaded: rests on data in every respect."
+    where = "Shaded, and in the strip: rests on data in every respect."
     if not shown.is_inside.any():
         where = "No sample rests on data in every respect: nothing is shaded."
     return Chart(

@@ -131,15 +131,17 @@ def test_the_band_lies_beside_the_page_as_a_file():
 
 def test_the_chart_shades_what_rests_on_data_and_says_where_nothing_does():
     chart = band_chart(SHOWN, "How it did.")
-    panel, beneath = chart.panels
+    panel, beneath, strip = chart.panels
     assert panel.spans == beneath.spans
+    (on_data,) = strip.curves
+    np.testing.assert_array_equal(on_data.upper, SHOWN.is_inside)
     assert panel.spans == ((0.0, pytest.approx(TIME[SHOWN.is_inside][-1])),)
     band, measured, predicted = panel.curves
     np.testing.assert_array_equal(band.values, SHOWN.lower)
     np.testing.assert_array_equal(band.upper, SHOWN.upper)
     np.testing.assert_array_equal(measured.values, SHOWN.measured)
     np.testing.assert_array_equal(predicted.values, SHOWN.output)
-    assert "Shaded: rests on data" in chart.sentence
+    assert "Shaded, and in the strip: rests on data" in chart.sentence
     # What is left of the measurement, and the same band about zero.
     band, left = beneath.curves
     np.testing.assert_allclose(left.values, -0.01, rtol=1e-12)
@@ -148,6 +150,7 @@ def test_the_chart_shades_what_rests_on_data_and_says_where_nothing_does():
 
     nothing = band_chart(replace(SHOWN, is_inside=TIME < 0), "How it did.")
     assert nothing.panels[0].spans == ()
+    assert not nothing.panels[2].curves[0].upper.any()
     assert "nothing is shaded" in nothing.sentence
 
 
