@@ -78,6 +78,8 @@ STAGE_VERSION = 6
 _OTHER_SIDE = 0.02
 # Times the largest recorded input beyond which an offered one is questioned.
 _FAR_OUTSIDE = 3.0
+# What is known of parameters before anything is, in what a model's own recordings tell.
+_LEAST_KNOWN = 1e-6
 # Hidden effects that a reason names.
 _NAMED_EFFECTS = 3
 
@@ -302,7 +304,7 @@ def _information(
 ) -> tuple[np.ndarray, str]:
     """What recordings tell of a model's parameters, and why they tell nothing, if so.
 
-    Those of the model have given the identity; others add what they would tell in a fit
+    Those of the model give the identity; others add what they would tell in a fit
     together with these. What is kept for the test tells nothing.
 
     Returns
@@ -311,7 +313,9 @@ def _information(
     str
     """
     trust = trust_of(fit, given.recordings, given.tested)
-    model, known = _model_of(fit), np.eye(len(trust.steps))
+    model, unit = _model_of(fit), np.eye(len(trust.steps))
+    is_own = {one.name for one in recordings} >= set(fit.identified_on)
+    known = unit if is_own else _LEAST_KNOWN * unit
     for one in recordings:
         if one.name not in (*fit.identified_on, *given.tested) and known.size:
             known = known + information_of(model, trust, one.input)
