@@ -40,7 +40,6 @@ def band_chart(shown: ShownBand, sentence: str) -> Chart:
     spans = _stretches(shown.time_s, shown.is_inside)
     parts = (shown.measured, shown.output, shown.lower, shown.upper)
     measured, output, lower, upper = (thinned(one, chosen) for one in parts)
-    on_data = thinned(shown.is_inside.astype(float), chosen)
     residual, below, above = (
         thinned(one - shown.output, chosen)
         for one in (shown.measured, shown.lower, shown.upper)
@@ -66,11 +65,7 @@ def band_chart(shown: ShownBand, sentence: str) -> Chart:
             lines=(0.0,),
             spans=spans,
         ),
-        Panel(
-            "on data",
-            (Curve(SHARE, np.zeros(on_data.size), "map", "band", upper=on_data),),
-            height_px=48,
-        ),
+        _strip(thinned(shown.is_inside.astype(float), chosen)),
     )
     where = "Shaded, and in the strip: rests on data in every respect."
     if not shown.is_inside.any():
@@ -86,6 +81,18 @@ def band_chart(shown: ShownBand, sentence: str) -> Chart:
         f"{thinned_note(chosen)}",
         alt="A prediction with its band of 90 % beside the measured output",
     )
+
+
+def _strip(on_data: np.ndarray) -> Panel:
+    """Where the prediction rests on data, below it.
+
+    Parameters
+    ----------
+    on_data : ndarray, shape (n_points,), [-]
+        1 there, 0 elsewhere.
+    """
+    curve = Curve(SHARE, np.zeros(on_data.size), "map", "band", upper=on_data)
+    return Panel("on data", (curve,), height_px=48)
 
 
 def _stretches(
