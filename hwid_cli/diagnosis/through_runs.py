@@ -40,7 +40,8 @@ _WORTH_A_STEP, _WORTH_A_SHARE = 1.0, 1e-2
 _MUCH_LESS = 0.7
 # No value moves by more than this factor (its logarithm) in a step.
 _LONGEST = 0.3
-_FIRST_DAMPING, _MORE_DAMPING = 1e-8, 10.0
+# After a step that leaves less, and after one that does not.
+_FIRST_DAMPING, _LESS_DAMPING, _MORE_DAMPING = 1e-8, 0.1, 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,8 +288,8 @@ class _Search:
             change *= min(1.0, _LONGEST / longest) if longest > 0.0 else 1.0
             there = self._moved(place, place.coordinates + change)
             if there is not None and there.sse < place.sse:
-                return self._further(place, there), damping / _MORE_DAMPING
-            damping *= _MORE_DAMPING * 10.0
+                return self._further(place, there), _LESS_DAMPING * damping
+            damping *= _MORE_DAMPING
         return None, damping
 
     def _further(self, place: _Place, there: _Place) -> _Place:

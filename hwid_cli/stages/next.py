@@ -17,7 +17,6 @@ from pathlib import Path
 
 import numpy as np
 
-from hwid_cli.data.recording_plan import read_plan
 from hwid_cli.diagnosis.hidden import LEAST_SHOWN, HiddenEffect
 from hwid_cli.diagnosis.next_experiment import (
     UNDECIDED,
@@ -25,12 +24,11 @@ from hwid_cli.diagnosis.next_experiment import (
     times_the_noise,
 )
 from hwid_cli.errors import ConfigError
-from hwid_cli.model.extrapolation import outlined_model
 from hwid_cli.model.scores import rmsd
 from hwid_cli.model.simulate import validation_output
 from hwid_cli.records.check import StagePlan
-from hwid_cli.records.experiment import Experiment, NextOptions, RecordingsOptions
-from hwid_cli.records.model import Fit, HammersteinWiener
+from hwid_cli.records.experiment import Experiment, NextOptions
+from hwid_cli.records.model import Fit
 from hwid_cli.records.next import (
     InputMap,
     NextRecordings,
@@ -39,12 +37,18 @@ from hwid_cli.records.next import (
     RepeatSpread,
 )
 from hwid_cli.records.recordings import Recording
-from hwid_cli.records.units import as_percent, behind
+from hwid_cli.records.units import as_percent
 from hwid_cli.report.next import next_blocks
 from hwid_cli.report.table import Block
 from hwid_cli.stages.diagnose import ToDiagnose, answers, hidden, undecided
 from hwid_cli.stages.diagnose import choose as choose_diagnosis
 from hwid_cli.stages.fit_seconds import counted
+from hwid_cli.stages.known_parameters import (
+    known_of_parameters,
+    left_of_errors,
+    model_of,
+)
+from hwid_cli.stages.offered_inputs import next_options, odd_inputs, offered_inputs
 from hwid_cli.stages.output_range import (
     Foresee,
     Reach,
@@ -68,18 +72,10 @@ from hwid_cli.tasks.cache import model_key, recording_key, task_key
 from hwid_cli.tasks.task import one_thread
 from hwid_cli.trust.choice import chosen_by_gain, information_gain, information_of
 from hwid_cli.trust.content import content, joined, value_edges, visited_share
-from hwid_cli.trust.designs import LEAST_SAMPLES, designs
-from hwid_cli.trust.repeats import is_as_planned
 from hwid_cli.trust.visited import N_BANDS
 
 NAME = "next"
 STAGE_VERSION = 6
-# Share of the largest input up to which inputs of the other sign are noise.
-_OTHER_SIDE = 0.02
-# Times the largest recorded input beyond which an offered one is questioned.
-_FAR_OUTSIDE = 3.0
-# What is known of parameters before anything is, in what a model's own recordings tell.
-_LEAST_KNOWN = 1e-6
 # Hidden effects that a reason names.
 _NAMED_EFFECTS = 3
 
@@ -299,47 +295,13 @@ def _proposal(
     return ProposedRecording(one.name, one.words, one.values, gain, words, reason)
 
 
-def _information(
-    given: ToChoose, fit: Fit, recordings: Sequence[Recording]
-) -> tuple[np.ndarray, str]:
-    """What recordings tell of a model's parameters, and why they tell nothing, if so.
-
-    Those of the model give the identity; others add what they would tell in a fit
-    together with these. What is kept for the test tells nothing.
-
-    Returns
-    -------
-    ndarray, shape (n_steps, n_steps), [-]
-    str
-    """
-    trust = trust_of(fit, given.recordings, given.tested)
-    model, unit = _model_of(fit), np.eye(len(trust.steps))
-    is_own = {one.name for one in recordings} >= set(fit.identified_on)
-    known = unit if is_own else _LEAST_KNOWN * unit
-    for one in recordings:
-        if one.name not in (*fit.identified_on, *given.tested) and known.size:
-            known = known + information_of(model, trust, one.input)
-    return known, trust.reason
-
-
-def _model_of(fit: Fit | None) -> HammersteinWiener:
-    """The model of a fit, as it leaves the program."""
-    if fit is None or fit.model is None:
-        raise ValueError("this goal has a model")
-    return outlined_model(fit.model)
-
-
-def _left_of_errors(known: np.ndarray) -> float:
-    """Standard errors over those that the model's own recordings leave, geometric mean."""
-    return float(np.exp(-0.5 * np.linalg.slogdet(known)[1] / len(known)))
-
-
 def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
     fit = given.fit
-    model = _model_of(fit)
+    model = model_of(fit)
     if fit is None:
         raise ValueError("this goal has a model")
-    known, reason = _information(given, fit, given.recordings)
+    trust = trust_of(fit, given.recordings, given.tested)
+    known = known_of_parameters(fit, trust, given.recordings, given.tested)
     count = len(known)
     own = " + ".join(fit.identified_on)
     words = (
@@ -347,9 +309,8 @@ def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
         "leaves are left"
     )
     if not count:
-        sentence = f"the parameters of {fit.name} cannot be told ({reason}); nothing is proposed"
+        sentence = f"the parameters of {fit.name} cannot be told ({trust.reason}); nothing is proposed"
         return _Choice(0.0, words, sentence, ())
-    trust = trust_of(fit, given.recordings, given.tested)
     found = chosen_by_gain(
         known,
         [information_of(model, trust, one.values) for one in given.offered],
@@ -371,7 +332,7 @@ def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
         one = given.offered[place]
         proposals.append(_proposal(one, by, "log determinant", reason))
     best = f"the best input on offer shrinks standard errors by {as_percent(max(shrinks, default=0.0), 1)}"
-    left = _left_of_errors(known)
+    left = left_of_errors(known)
     sentence = f"{as_percent(left)} {words}; " + _verdict(
         len(proposals), best, given.options.enough
     )
@@ -517,8 +478,9 @@ def _known_before(given: ToChoose, before: NextRecordings) -> float:
     if given.options.goal == "coverage":
         return _visited(given, earlier)
     if given.options.goal == "parameters" and given.fit is not None:
-        known, _ = _information(given, given.fit, earlier)
-        return _left_of_errors(known) if known.size else 0.0
+        trust = trust_of(given.fit, given.recordings, given.tested)
+        known = known_of_parameters(given.fit, trust, earlier, given.tested)
+        return left_of_errors(known) if known.size else 0.0
     return before.known
 
 
@@ -537,13 +499,13 @@ def _input_map(given: ToChoose, proposed: Sequence[np.ndarray]) -> InputMap:
 
 def _choose(context: Context) -> ToChoose:
     experiment, results = context.experiment, context.results
-    options = _options(experiment)
+    options = next_options(experiment)
     recordings = results["calibrate"].recordings
     is_diagnosis = options.goal == "diagnosis"
     return ToChoose(
         options,
         recordings,
-        _offered(experiment, recordings),
+        offered_inputs(experiment, recordings),
         kept_for_test(experiment),
         _model(experiment, results["identify"], recordings)
         if _asks_model(options)
@@ -580,112 +542,6 @@ def _model(
     return min(best, key=error)
 
 
-def _offered(
-    experiment: Experiment, recordings: Sequence[Recording]
-) -> tuple[PlannedInput, ...]:
-    options, first = _options(experiment), recordings[0]
-    if options.plan is not None:
-        path = Path(experiment.source).parent / options.plan
-        return read_plan(path, _files(experiment), first.sample_time_s)
-    limits = options.limits
-    if limits is None:
-        raise ValueError("a configuration without plan and limits is refused")
-    found = designs(
-        limits.amplitude,
-        limits.rate,
-        limits.duration_s,
-        first.sample_time_s,
-        first.input_unit,
-        side=_usual_sign(recordings) if limits.one_sided else 0,
-    )
-    if not found:
-        least = LEAST_SAMPLES * first.sample_time_s
-        unit = behind(first.input_unit)
-        raise ConfigError(
-            f"{experiment.source}: next.limits: found amplitude {limits.amplitude:g}"
-            f"{unit}, rate {limits.rate:g}{unit}/s and {limits.duration_s:g} s, within "
-            "which no input fits; expected a twentieth of the amplitude to be reached "
-            f"within the duration, and at least {least:g} s; raise rate or duration_s"
-        )
-    return found
-
-
-def _usual_sign(recordings: Sequence[Recording]) -> int:
-    """Sign of the largest input."""
-    lowest = min(float(one.input.min()) for one in recordings)
-    highest = max(float(one.input.max()) for one in recordings)
-    return 1 if highest >= -lowest else -1
-
-
-def _warnings(context: Context, given: ToChoose) -> list[str]:
-    """What is odd about inputs on offer, and about recordings of planned ones."""
-    said = [*_other_inputs(given), *_far_outside(given)]
-    limits, recordings = given.options.limits, given.recordings
-    if limits is None or limits.one_sided:
-        return said
-    sign = _usual_sign(recordings)
-    largest = max(float((sign * one.input).max()) for one in recordings)
-    lowest = min(float((sign * one.input).min()) for one in recordings)
-    if lowest < -_OTHER_SIDE * largest:
-        return said
-    word = "negative" if sign > 0 else "positive"
-    return [
-        *said,
-        f"no recording has a {word} input, but designed ones may: where there is none, "
-        f"as of a heater, put one_sided: true into next.limits of {context.experiment.source}",
-    ]
-
-
-def _other_inputs(given: ToChoose) -> list[str]:
-    """Recordings that have the name of an offered input, and another input."""
-    planned = {one.name: one for one in given.plan}
-    return [
-        f"{one.name}: its input is not what was to be played under this name "
-        f"({planned[one.name].words}); it counts as what was measured: record it again, "
-        "or give it another name"
-        for one in given.recordings
-        if one.name in planned
-        and not is_as_planned(one.input, planned[one.name].values)
-    ]
-
-
-def _far_outside(given: ToChoose) -> list[str]:
-    """That inputs of a plan are far larger than any that was recorded, if so."""
-    largest = max(float(np.abs(one.input).max()) for one in given.recordings)
-    sizes = {one.name: float(np.abs(one.values).max()) for one in given.offered}
-    far = [name for name, size in sizes.items() if size > _FAR_OUTSIDE * largest]
-    if not far or given.options.plan is None:
-        return []
-    worst, unit = (
-        max(far, key=sizes.__getitem__),
-        behind(given.recordings[0].input_unit),
-    )
-    return [
-        f"{counted(len(far), 'input')} of the plan are far larger than all recorded ones: "
-        f"{worst} reaches {sizes[worst]:g}{unit}, recordings {largest:g}{unit}; make sure "
-        "that the machine bears it"
-    ]
-
-
-def _files(experiment: Experiment) -> RecordingsOptions:
-    if experiment.recordings is None:
-        raise ConfigError(
-            f"{experiment.source}: recordings: missing; expected the section, which says "
-            "in which column a file has its input; add it"
-        )
-    return experiment.recordings
-
-
-def _options(experiment: Experiment) -> NextOptions:
-    if experiment.next is None:
-        raise ConfigError(
-            f"{experiment.source}: next: the section is missing; expected what could be "
-            "recorded; add it, such as 'next: {limits: {amplitude: 6.0, rate: 50, "
-            "duration_s: 7.5}}'"
-        )
-    return experiment.next
-
-
 def _needs(experiment: Experiment) -> tuple[str, ...]:
     options = experiment.next
     if options is None:
@@ -716,7 +572,7 @@ def _tables(_: Context, result: NextRecordings) -> list[Block]:
 
 
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:
-    offered = _offered(planning.experiment, planning.recordings)
+    offered = offered_inputs(planning.experiment, planning.recordings)
     what = (
         f"{counted(len(offered), 'input')} on offer, for {_goal(planning.experiment)}"
     )
@@ -725,7 +581,7 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
 
 
 def _goal(experiment: Experiment) -> str:
-    return _options(experiment).goal
+    return next_options(experiment).goal
 
 
 STAGE = Stage(
@@ -733,7 +589,7 @@ STAGE = Stage(
     needs=("calibrate",),
     needs_for=_needs,
     sections=("next",),
-    require=_options,
+    require=next_options,
     choose=_choose,
     key=lambda given: given.key,
     compute=propose_next,
@@ -748,7 +604,9 @@ STAGE = Stage(
     ),
     write_files=_write_files,
     tables=_tables,
-    warnings=_warnings,
+    warnings=lambda context, given: odd_inputs(
+        given.options, given.recordings, given.plan, context.experiment.source
+    ),
     plan=_plan,
     files=("next.csv", "next.json", "next"),
 )
