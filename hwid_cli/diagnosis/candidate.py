@@ -7,8 +7,9 @@ docs/method_diagnosis.md, eq. (D18) and (D19).
 Below it, what a fit stands for: its drive, its effects, its point of a search.
 """
 
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -133,10 +134,24 @@ class SearchStart:
         Parameters of the base.
     effects : mapping of str to mapping of str to float
         Parameters of all effects, those of the simulation included.
+
+    Examples
+    --------
+    >>> start = SearchStart({"mass_kg": 2.0}, {"coulomb_friction": {"force_N": 5.0}})
+    >>> SearchStart.of_text(str(start)).effects
+    {'coulomb_friction': {'force_N': 5.0}}
     """
 
     base: Mapping[str, float]
     effects: Start
+
+    def __str__(self) -> str:
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def of_text(cls, text: str) -> "SearchStart":
+        """Read what ``str`` gives, to the last digit."""
+        return cls(**json.loads(text))
 
 
 @dataclass(frozen=True, eq=False)

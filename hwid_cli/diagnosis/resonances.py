@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 import scipy
 
-from hwid_cli.diagnosis.candidate import SearchStart
+from hwid_cli.diagnosis.candidate import SearchStart, base_of
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.tasks import DiagnosisTask, RunTasks
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Scales, Values
 from hwid_cli.drive.linear import equations_with_force
+from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.drive import Drive
 
 # Lines of each recording that are looked at: those of most energy but the first, which
@@ -91,20 +92,28 @@ def resonances(
     resonant = [one for one in allowed if CATALOGUE[one].resonant is not None]
     if drive.controller is not None or drive.stiffness_N_per_m <= 0:
         return {}
+    base = {"base": base_of(drive), "effects": drive_effects(drive), "hold": drive.hold}
     tasks = [
         DiagnosisTask(
             f"{one} in spectra", resonance_starts, (problem, drive, one, scales),
-            tuple, {"spectra": one},
+            ResonanceStarts, {"spectra": one, **base},
         )
         for one in resonant
     ]  # fmt: skip
-    found = run_tasks(tasks, keep=False) if tasks else []
-    return dict(zip(resonant, found, strict=True))
+    found = run_tasks(tasks, keep=True) if tasks else []
+    return {one: each.starts for one, each in zip(resonant, found, strict=True)}
+
+
+@dataclass(frozen=True, eq=False)
+class ResonanceStarts:
+    """Where spectra say that one effect begins, the best first; empty where nowhere."""
+
+    starts: tuple[SearchStart, ...]
 
 
 def resonance_starts(
     problem: DiagnosisProblem, drive: Drive, effect: str, scales: Scales
-) -> tuple[SearchStart, ...]:
+) -> ResonanceStarts:
     """Where spectra of the training recordings say that one effect begins.
 
     Parameters
@@ -119,7 +128,7 @@ def resonance_starts(
     resonant = CATALOGUE[effect].resonant
     low, highest = _LOWEST * scales.natural_Hz, _highest(lines)
     if resonant is None or not low < highest:
-        return ()
+        return ResonanceStarts(())
     search = _Search(drive, effect, scales, lines)
     begun = [
         search.go_on(search.begin(values), _FIRST_STEPS, by_shares=True)
@@ -129,7 +138,8 @@ def resonance_starts(
     nearest = _different(begun)[:_N_GO_ON]
     found = [search.go_on(at, _NEXT_STEPS, by_shares=True)[1] for at in nearest]
     ended = [search.go_on(at, _LAST_STEPS, by_shares=False) for at in found]
-    return tuple(search.start(at) for at in _different(ended)[:_N_STARTS])
+    starts = tuple(search.start(at) for at in _different(ended)[:_N_STARTS])
+    return ResonanceStarts(starts)
 
 
 def _moving_most(signals: Sequence[Signals]) -> list[Signals]:

@@ -239,17 +239,30 @@ class SetFits:
         if not proposed:
             return []
         self._begin(f"{name}, screening", len(proposed))
-        baseline = self.rounds.baseline
+        with_resonances = self.rounds.baseline.with_resonances
         tasks = [
-            DiagnosisTask(
-                "+".join(ids) or "base", screen,
-                (self.few, ids, baseline.with_resonances(ids, starts), baseline.scales),
-                Screened, {"effects": ids},
-            )
+            self._screening_task(ids, with_resonances(ids, starts))
             for ids, starts in proposed.items()
-        ]  # fmt: skip
-        found: list[Screened] = self.rounds.run_tasks(tasks, keep=False)
+        ]
+        found: list[Screened] = self.rounds.run_tasks(tasks, keep=True)
         return found
+
+    def _screening_task(
+        self, ids: Effects, starts: Sequence[SearchStart]
+    ) -> DiagnosisTask:
+        """Task that fits a set of effects cheaply."""
+        problem, base = self.rounds.problem, self.rounds.base
+        return DiagnosisTask(
+            name="+".join(ids) or "base",
+            function=screen,
+            arguments=(self.few, ids, starts, self.rounds.baseline.scales),
+            result_type=Screened,
+            content={
+                "screened": ids, "starts": list(starts), "pieces": _starts_of(problem),
+                "hold": problem.drive.hold,
+            },
+            arrays=(base.values, base.sse),
+        )  # fmt: skip
 
     def finish(self, what: str, sets: Mapping[Effects, Sequence[SearchStart]]) -> None:
         """Fit sets of effects to the end; keep what is better than before.

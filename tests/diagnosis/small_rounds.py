@@ -52,9 +52,9 @@ class Screenings:
         self.factors, self.turns = factors, []
 
     def run(self, tasks, *, keep):
-        assert not keep
-        self.turns.append([one.content["effects"][0] for one in tasks])
-        return [self._screened(*one.content["effects"]) for one in tasks]
+        assert keep
+        self.turns.append([one.content["screened"][0] for one in tasks])
+        return [self._screened(*one.content["screened"]) for one in tasks]
 
     def _screened(self, effect):
         turns = sum(effect in turn for turn in self.turns)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from hwid_cli.diagnosis.candidate import Screened, SearchStart
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.model import LinearBlock
 from hwid_cli.records.trust import RecordingTrust, ShownBand, TrustOnTests
@@ -217,6 +218,19 @@ def test_parameters_of_a_candidate_are_stored_as_text():
         assert file.attrs["own_names"].shape == (0,)
         again = read_record(file, CandidateFit)
     assert (again.names, again.own_names) == (fit.names, ())
+
+
+def test_starts_of_a_search_come_back_to_the_last_digit():
+    base = {"mass_kg": np.float64(0.1) * 3, "stiffness_N_per_m": np.inf}
+    starts = (
+        SearchStart(base, {"coulomb_friction": {"force_N": 1 / 3}}),
+        SearchStart({}, {}),
+    )
+    with in_memory() as file:
+        write_record(file, Screened(("coulomb_friction",), 5e-324, starts))
+        again = read_record(file, Screened)
+    assert again.starts == starts
+    assert again.sse == 5e-324
 
 
 def test_a_single_text_in_place_of_parameters_is_an_error():
