@@ -23,7 +23,7 @@ from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.own_base import judged_by_own_base, with_own_base
 from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
-from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence
+from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence, with_starts
 from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator, most_runs
 from hwid_cli.diagnosis.single_effects import ToldByRuns, single_in_simulation
@@ -90,14 +90,11 @@ def diagnose_foreign(
     problem = without_repeats(problem)
     on_round("the simulation as given", len(problem.signals))
     begun = begin(problem, simulator, options, counted)
-    runs, given, refitted = begun.runs, list(begun.given), dict(simulator.values)
+    given, refitted = list(begun.given), dict(simulator.values)
     if simulator.free and not simulator.is_extended:
         on_round("its parameters", 0)
-        signals, noise = begun.problem.signals, noise_floor(begun.problem)
-        refitted = fit_parameters(
-            runs.tried, signals, simulator.free, refitted, noise.rms
-        )
-        given = runs.of(signals, refitted)
+        begun, given, refitted = _refitted(begun, refitted)
+    runs = begun.runs
     search = _searched(begun, given, refitted, options, on_round)
     found, values = search.findings, search.values
     if search.is_confirmed and not _is_all_but_nothing(found):
@@ -113,6 +110,31 @@ def diagnose_foreign(
     if not search.is_confirmed:
         return replace(told, confirmed="surrogate")
     return _confirmed(told, found, (runs, values), on_round)
+
+
+def _refitted(
+    begun: Begun, values: dict[str, float]
+) -> tuple[Begun, list[SimulatorRun], dict[str, float]]:
+    """The simulation's parameters fitted again, and its runs with them.
+
+    Starts of the recordings that did not show beside parameters that are off are taken
+    off then, and the parameters are fitted once more.
+    """
+    values, given = _fitted_to(begun, values)
+    later = with_starts(begun, given)
+    if later is begun:
+        return begun, given, values
+    values, given = _fitted_to(later, values)
+    return later, given, values
+
+
+def _fitted_to(
+    begun: Begun, values: dict[str, float]
+) -> tuple[dict[str, float], list[SimulatorRun]]:
+    runs, signals = begun.runs, begun.problem.signals
+    noise = noise_floor(begun.problem).rms
+    values = fit_parameters(runs.tried, signals, runs.simulator.free, values, noise)
+    return values, runs.of(signals, values)
 
 
 def _said_of_runs(counted: CountedRuns, found: Findings) -> tuple[str, ...]:

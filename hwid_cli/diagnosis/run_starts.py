@@ -102,19 +102,38 @@ def begin(
     runs = Runs(simulator, run_tasks)
     given = runs.of(problem.signals, simulator.values)
     problem, runs = _with_holds(problem, runs)
-    is_said = options.initial_state != "rest"
+    begun = Begun(problem, runs, tuple(given), RunStarts())
+    return with_starts(begun, given, is_said=options.initial_state != "rest")
+
+
+def with_starts(
+    begun: Begun, given: Sequence[SimulatorRun], *, is_said: bool = False
+) -> Begun:
+    """The same from where the recordings start, if that shows beside given runs.
+
+    Parameters
+    ----------
+    given : sequence of SimulatorRun
+        From where the simulation starts by itself, with any values of its parameters:
+        beside wrong ones starts may be a small part of the gap.
+    is_said : bool
+        Whether starts may be anywhere, as somebody has said.
+    """
+    problem, runs = begun.problem, begun.runs
+    if begun.starts.above:
+        return begun
     above = starts_above(problem.signals, given, is_said=is_said)
-    starts = RunStarts()
-    if above:
-        drive = fit_stand_in(problem.signals, given)
-        is_free = drive.stiffness_N_per_m == 0 and drive.bends == (0.0, 0.0)
-        # Of a velocity none shows where a machine is.
-        is_place = is_free and simulator.output == "position"
-        starts = RunStarts(above, are_places=is_place)
-        runs = replace(runs, starts=starts.of_places)
-        given = runs.from_starts(problem.signals, given)
+    if not above:
+        return begun
+    drive = fit_stand_in(problem.signals, given)
+    is_free = drive.stiffness_N_per_m == 0 and drive.bends == (0.0, 0.0)
+    # Of a velocity none shows where a machine is.
+    is_place = is_free and runs.simulator.output == "position"
+    starts = RunStarts(above, are_places=is_place)
+    runs = replace(runs, starts=starts.of_places)
     signals = starts.taken_off(problem.signals)
-    return Begun(replace(problem, signals=signals), runs, tuple(given), starts)
+    own = tuple(runs.from_starts(problem.signals, begun.given))
+    return Begun(replace(problem, signals=signals), runs, own, starts)
 
 
 def _with_holds(problem: DiagnosisProblem, runs: Runs) -> tuple[DiagnosisProblem, Runs]:

@@ -7,7 +7,12 @@ import pytest
 from scipy.signal import lsim
 
 from hwid_cli.diagnosis.problem import Signals
-from hwid_cli.diagnosis.run_starts import begin, starts_above, starts_sentence
+from hwid_cli.diagnosis.run_starts import (
+    begin,
+    starts_above,
+    starts_sentence,
+    with_starts,
+)
 from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.diagnosis.standing import its_own, prepare
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -126,6 +131,31 @@ def test_a_free_axis_runs_from_its_start_and_a_spring_has_a_sensor_with_a_zero(
     shown = begun.beside_recordings([one.output for one in begun.given])
     for one in found:
         assert abs(np.mean(one.output - shown[one.name])) < 1e-3
+
+
+@pytest.mark.parametrize(("stiffness", "are_places"), [(0.0, True), (80.0, False)])
+def test_starts_that_wrong_parameters_hide_show_beside_right_ones(
+    stiffness, are_places
+):
+    def with_gain(request):
+        gain = request.parameters["gain"]
+        return SimulatorRun(gain * axis(request.input, stiffness), NOTHING)
+
+    simulator = Simulator(Capabilities(run=True), with_gain, values={"gain": 3.0})
+    small = [0.05 * one for one in STARTS]
+    problem = prepare(
+        recordings(small, stiffness), its_own(simulator), DiagnoseOptions(), ()
+    )
+    begun = begin(problem, simulator, DiagnoseOptions(), Count())
+    assert begun.starts.above == {}
+    right = begun.runs.of(begun.problem.signals, {"gain": 1.0})
+    later = with_starts(begun, right)
+    assert list(later.starts.above.values()) == pytest.approx(small, abs=2e-3)
+    assert later.starts.are_places == are_places
+    # What the given parameters leave is counted from there, too.
+    firsts = [one.output[0] for one in later.given]
+    assert firsts == pytest.approx(small if are_places else [0.0] * 3, abs=2e-3)
+    assert with_starts(later, right) is later
 
 
 def test_what_was_done_about_starts_is_said_with_its_unit():
