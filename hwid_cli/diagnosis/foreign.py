@@ -27,7 +27,7 @@ from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence, with_st
 from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator, most_runs
 from hwid_cli.diagnosis.single_effects import ToldByRuns, single_in_simulation
-from hwid_cli.diagnosis.stand_in import change_between
+from hwid_cli.diagnosis.stand_in import act_as_forces, change_between, lag_before
 from hwid_cli.diagnosis.standing import its_own, standing_beside
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
 from hwid_cli.diagnosis.turns import have_moved, where_it_starts
@@ -473,8 +473,11 @@ def _told(
     # Without an effect the table says whose gap this is.
     if base and told.effects and not change.is_none:
         warnings = (*warnings, _BESIDE_PARAMETERS)
-    said = starts_sentence(begun.starts.above, begun.problem.unit)
-    warnings = (*warnings, said) if said else warnings
+    said = (
+        starts_sentence(begun.starts.above, begun.problem.unit),
+        _lag_sentence(findings),
+    )
+    warnings = (*warnings, *filter(None, said))
     return replace(
         told,
         base=base or told.base,
@@ -482,6 +485,19 @@ def _told(
         capabilities=simulator.capabilities,
         stand_in=change,
         warnings=warnings,
+    )
+
+
+def _lag_sentence(findings: Findings) -> str:
+    """Say that effects act behind a lag of the input; empty where none does."""
+    effects = findings.verdict.chosen.effects
+    lag = lag_before(findings.problem.drive, effects)
+    if not lag or not effects or not act_as_forces(effects):
+        return ""
+    return (
+        f"the simulation's input passes a lag of {lag:.3g} s before it acts as a force; "
+        "what is missing acts behind it, and comes through the input ahead by as much (an "
+        "input for forces, simulation.force_input, shows more)"
     )
 
 

@@ -265,7 +265,9 @@ class PortSearch:
         if forces is None:
             return None
         rows = {one.name: row for row, one in enumerate(self._problem.signals)}
-        sent = as_sent(self._runs, self._problem, forces, at_force=False)
+        sent = as_sent(
+            self._runs, self._problem, forces, self._on_input.effects, at_force=False
+        )
         chosen = [sent[rows[one.name]] for one in signals]
         some = replace(self._problem, signals=tuple(signals))
         return pushed(self._runs, some, chosen, False, own)

@@ -128,7 +128,7 @@ def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
     changed = replace(problem, drive=fitted_drive(problem.drive, fit))
     names = [one.name for one in problem.signals]
     each = forces_along(changed, motions)
-    sent = as_sent(runs, problem, each, at_force=turn.at_force)
+    sent = as_sent(runs, problem, each, fit.effects, at_force=turn.at_force)
     forces = dict(zip(names, sent, strict=True))
 
     def ask(
@@ -161,7 +161,7 @@ def begun_with(
     """
     problem = turn.problem
     given = runs.tried(problem.signals, values)
-    sent = as_sent(runs, problem, forces, at_force=turn.at_force)
+    sent = as_sent(runs, problem, forces, turn.fit.effects, at_force=turn.at_force)
     found = pushed(runs, problem, sent, turn.at_force, values)
     if given is None or found is None:
         return None

@@ -446,6 +446,15 @@ def act_as_forces(effects: Sequence[str]) -> bool:
     return not enters or bool(enters - {"command", "output"})
 
 
+def lag_before(drive: Drive, effects: Sequence[str]) -> float:
+    """Lag of a simulation's input that what is missing acts behind, [s]; 0 for none.
+
+    What changes the input itself acts before it.
+    """
+    at_input = any(CATALOGUE[one].enters == "command" for one in effects)
+    return drive.lag_s if isinstance(drive, StandIn) and not at_input else 0.0
+
+
 def changes_input(effects: Sequence[str]) -> bool:
     """Whether effects change the input alone, which no stand-in needs to tell."""
     return bool(effects) and all(CATALOGUE[one].enters == "command" for one in effects)

@@ -13,6 +13,7 @@ import numpy as np
 import scipy
 
 from hwid_cli.diagnosis.candidate import base_of
+from hwid_cli.diagnosis.input_lag import behind_lag
 from hwid_cli.diagnosis.parameters import drive_at, first_point, parameter_layout
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.scales import scales_of_recordings
@@ -28,7 +29,7 @@ from hwid_cli.diagnosis.stand_in import (
     seen_start,
 )
 from hwid_cli.drive.springs import spring_force
-from hwid_cli.records.drive import LINE, StandIn
+from hwid_cli.records.drive import HELD, LINE, StandIn
 from hwid_cli.records.programs import SimulatorRun
 
 # A spring or a damper that gives less of the force than this share is none.
@@ -55,6 +56,11 @@ _PUSHES_BACK = 1.2
 # Friction is in a simulation where it leaves at most this share of what other drives do.
 _DRY = 0.2
 _ITERATIONS = 20
+# A lag of the input is one where what drives without it leave is at least this much, and
+# the best lag leaves at most this share of it; so many are looked at, from this share of a
+# sample to this one of a recording.
+_LEAST_BEFORE_LAG, _BEHIND_LAG = 0.01, 0.2
+_N_LAGS, _SHORTEST_LAG, _LONGEST_LAG = 16, 0.3, 0.1
 
 
 def fit_stand_in(
@@ -62,6 +68,7 @@ def fit_stand_in(
     runs: Sequence[SimulatorRun],
     *,
     may_curve: bool = True,
+    may_lag: bool = False,
     hold: str = LINE,
 ) -> StandIn:
     """Plain drive that moves most nearly as a simulation does.
@@ -76,13 +83,80 @@ def fit_stand_in(
         What the simulation made of them.
     may_curve : bool
         Whether its spring may be curved.
+    may_lag : bool
+        Whether it may stand behind a lag of the input.
     hold : str
         How the simulation's input goes on between samples; one of ``records.drive.HOLDS``.
 
     References
     ----------
-    docs/method_diagnosis.md, eq. (D30).
+    docs/method_diagnosis.md, eq. (D30) and (D30e).
     """
+    lag = _lag_of_input(signals, runs, hold) if may_lag else 0.0
+    if not lag:
+        return _fitted(signals, runs, may_curve=may_curve, hold=hold)
+    behind = _behind(signals, lag, hold)
+    # What has passed a lag makes no jumps, whatever its input does.
+    drive = _fitted(behind, runs, may_curve=may_curve, hold=LINE)
+    return replace(drive, hold=hold, lag_s=lag)
+
+
+def _behind(signals: Sequence[Signals], lag_s: float, hold: str) -> list[Signals]:
+    """Recordings whose inputs have passed a lag."""
+    is_held = hold == HELD
+    return [
+        replace(
+            one,
+            driven_by=behind_lag(
+                one.driven_by, lag_s, one.sample_time_s, is_held=is_held
+            ),
+        )
+        for one in signals
+    ]
+
+
+def _lag_of_input(
+    signals: Sequence[Signals], runs: Sequence[SimulatorRun], hold: str
+) -> float:
+    """Time constant of a lag without which no drive moves as the simulation, [s]; or 0."""
+    kinds: tuple[dict[str, bool], ...] = ({}, {"is_curved": True}, {"is_dry": True})
+    before = min(_by_regression(signals, runs, hold, **one).left for one in kinds)
+    if before < _LEAST_BEFORE_LAG:
+        return 0.0
+    step = signals[0].sample_time_s
+    longest = _LONGEST_LAG * step * min(one.driven_by.size for one in signals)
+    rows, sizes, _ = _columns(signals, runs, is_curved=True)
+    # Only the input changes with the lag: the columns are worked off once.
+    basis, among = np.linalg.qr(rows / _lengths(rows))
+
+    def left(log_lag: float) -> float:
+        behind = _behind(signals, float(np.exp(log_lag)), hold)
+        pairs = zip(behind, sizes, strict=True)
+        right = np.concatenate([one.driven_by / size for one, size in pairs])
+        along = basis.T @ right
+        beside = max(float(right @ right - along @ along), 0.0)
+        inner = scipy.optimize.nnls(among, along)[1]
+        return float(np.sqrt((beside + inner**2) / (right @ right)))
+
+    logs = np.log(np.geomspace(_SHORTEST_LAG * step, longest, _N_LAGS))
+    lefts = [left(one) for one in logs]
+    at = int(np.argmin(lefts))
+    if at in (0, _N_LAGS - 1) or lefts[at] > before:
+        return 0.0
+    best = scipy.optimize.minimize_scalar(
+        left, bounds=(logs[at - 1], logs[at + 1]), method="bounded"
+    )
+    return float(np.exp(best.x)) if best.fun <= _BEHIND_LAG * before else 0.0
+
+
+def _fitted(
+    signals: Sequence[Signals],
+    runs: Sequence[SimulatorRun],
+    *,
+    may_curve: bool,
+    hold: str,
+) -> StandIn:
+    """The drive of an input that has passed no lag, or of what has passed it."""
     straight = _by_regression(signals, runs, hold)
     curved = _by_regression(signals, runs, hold, is_curved=True)
     ways = [moved_as(one, run).position for one, run in zip(signals, runs, strict=True)]
@@ -301,25 +375,52 @@ def _by_regression(
         Beside a friction that goes with the direction alone, where something moves; it
         is no part of the drive.
     """
-    rows, right, kind = [], [], StandIn(1.0, 0.0, 0.0, 1.0, hold=hold)
+    kind = StandIn(1.0, 0.0, 0.0, 1.0, hold=hold)
+    rows, sizes, used = _columns(signals, runs, is_curved=is_curved, is_dry=is_dry)
+    right = np.concatenate([
+        along_motion(kind, one.driven_by)[counts] / size
+        for one, size, counts in zip(signals, sizes, used, strict=True)
+    ])  # fmt: skip
+    best = _balanced(rows, right, is_curved=is_curved)
+    output = _output_of(signals[0])
+    return replace(best, drive=replace(best.drive, output=output, hold=hold))
+
+
+def _columns(
+    signals: Sequence[Signals],
+    runs: Sequence[SimulatorRun],
+    *,
+    is_curved: bool = False,
+    is_dry: bool = False,
+) -> tuple[np.ndarray, list[float], list[np.ndarray]]:
+    """What may balance an input along the motion of a simulation.
+
+    Returns
+    -------
+    ndarray, shape (n_used, n_columns)
+        Acceleration, velocity, position, pairs of what may have either sign, and what a
+        friction does, each recording over the size of its input.
+    list of float, [input unit]
+        These sizes.
+    list of ndarray of bool, shape (n_samples,)
+        Which samples are used.
+    """
+    rows, sizes, used = [], [], []
     for one, found in zip(signals, runs, strict=True):
         moved = moved_as(one, found)
-        size = float(np.std(one.driven_by)) or 1.0
+        sizes.append(float(np.std(one.driven_by)) or 1.0)
         # What may have either sign is two columns that are not negative.
         signed = [np.ones(one.driven_by.size)]
         if is_curved:
             signed += [moved.position**2, moved.position**3]
         columns = [moved.acceleration, moved.velocity, moved.position]
         columns += [sign * column for column in signed for sign in (1.0, -1.0)]
-        used = np.ones(one.driven_by.size, dtype=bool)
+        used.append(np.ones(one.driven_by.size, dtype=bool))
         if is_dry:
             columns.append(np.sign(moved.velocity))
-            used = _moves(moved)
-        rows.append(np.column_stack(columns)[used] / size)
-        right.append(along_motion(kind, one.driven_by)[used] / size)
-    best = _balanced(np.concatenate(rows), np.concatenate(right), is_curved=is_curved)
-    output = _output_of(signals[0])
-    return replace(best, drive=replace(best.drive, output=output, hold=hold))
+            used[-1] = _moves(moved)
+        rows.append(np.column_stack(columns)[used[-1]] / sizes[-1])
+    return np.concatenate(rows), sizes, used
 
 
 def _output_of(signals: Signals) -> str:

@@ -68,7 +68,7 @@ def stand_in_for(begun: Begun, *, may_curve: bool = True) -> StandIn:
         Whether its spring may be curved.
     """
     problem, runs, given = begun.problem, begun.runs, begun.given
-    drive = _standing(problem, given, may_curve=may_curve)
+    drive = _standing(runs, problem, given, may_curve=may_curve)
     return force_in_newtons(runs, problem.signals, given, runs.simulator.values, drive)
 
 
@@ -103,7 +103,7 @@ def standing_beside(
         What the simulation gives with them.
     """
     simulator = runs.simulator
-    drive = _standing(problem, given)
+    drive = _standing(runs, problem, given)
     drive = force_in_newtons(runs, problem.signals, given, values, drive)
     has_force = simulator.capabilities.force
     drive = replace(
@@ -125,12 +125,22 @@ def standing_beside(
 
 
 def _standing(
-    problem: DiagnosisProblem, given: Sequence[SimulatorRun], *, may_curve: bool = True
+    runs: Runs,
+    problem: DiagnosisProblem,
+    given: Sequence[SimulatorRun],
+    *,
+    may_curve: bool = True,
 ) -> StandIn:
     """The stand-in, with where laws count from."""
+    simulator = runs.simulator
+    comes_through_input = simulator.run is not None and not simulator.capabilities.force
     return replace(
         fit_stand_in(
-            problem.signals, given, may_curve=may_curve, hold=problem.drive.hold
+            problem.signals,
+            given,
+            may_curve=may_curve,
+            may_lag=comes_through_input,
+            hold=problem.drive.hold,
         ),
         reference_current_A=problem.drive.reference_current_A,
         reference_displacement_m=problem.drive.reference_displacement_m,

@@ -19,7 +19,7 @@ from hwid_cli.diagnosis.candidate import (
 )
 from hwid_cli.diagnosis.causes import left_over
 from hwid_cli.diagnosis.findings import Findings
-from hwid_cli.diagnosis.held_force import mean_over_steps
+from hwid_cli.diagnosis.input_lag import through_input
 from hwid_cli.diagnosis.joint_fit import (
     fitted_again,
     fitted_together,
@@ -38,6 +38,7 @@ from hwid_cli.diagnosis.stand_in import (
     act_as_forces,
     corrected,
     force_of_motion,
+    lag_before,
     starts_in_balance,
 )
 from hwid_cli.drive.simulation import Motion, drive_effects
@@ -253,7 +254,7 @@ def answered(findings: Findings, turn: Turn, runs: Runs) -> Answer | None:
     forces = forces_along(problem, motions)
     if not all(np.isfinite(one).all() for one in forces):
         return None
-    sent = as_sent(runs, problem, forces, at_force=turn.at_force)
+    sent = as_sent(runs, problem, forces, turn.fit.effects, at_force=turn.at_force)
     found = pushed(runs, problem, sent, turn.at_force, turn.values)
     if found is None:
         return None
@@ -283,7 +284,7 @@ def _next_turn(findings: Findings, turn: Turn, runs: Runs) -> Turn | None:
         return replace(following, fit=fit)
     if not turn.slopes or have_moved(turn.slopes_at, turn.values, _SAME_SLOPES):
         problem, rms = following.problem, findings.criteria.noise.rms
-        sent = as_sent(runs, problem, forces, at_force=turn.at_force)
+        sent = as_sent(runs, problem, forces, turn.fit.effects, at_force=turn.at_force)
         push = partial(pushed, runs, problem, sent, turn.at_force)
         slopes = tuple(_slopes(runs, push, turn.values, found, rms))
         following = replace(following, slopes=slopes, slopes_at=turn.values)
@@ -314,6 +315,7 @@ def as_sent(
     runs: Runs,
     problem: DiagnosisProblem,
     forces: Sequence[np.ndarray],
+    effects: Sequence[str],
     *,
     at_force: bool,
 ) -> list[np.ndarray]:
@@ -323,11 +325,18 @@ def as_sent(
     ----------
     forces : sequence of ndarray, shape (n_samples,), [N]
         In straight lines between samples.
+    effects : sequence of str
+        That make them, beside those of the drive.
     at_force : bool
         At its force input, not through its input.
     """
-    is_held = runs.are_held if at_force else problem.drive.hold == HELD
-    return [mean_over_steps(one) for one in forces] if is_held else list(forces)
+    drive = problem.drive
+    is_held = runs.are_held if at_force else drive.hold == HELD
+    lag = 0.0 if at_force else lag_before(drive, (*drive_effects(drive), *effects))
+    return [
+        through_input(force, lag, one.sample_time_s, is_held=is_held)
+        for force, one in zip(forces, problem.signals, strict=True)
+    ]
 
 
 def have_moved(

@@ -230,7 +230,9 @@ class _Moving:
             layout, point = rebuilt(findings.problem, chosen, findings.scales)
             motions = simulate_at(findings.problem, layout, point)
             of_all = forces_along(findings.problem, motions)
-            of_all = as_sent(runs, findings.problem, of_all, at_force=at_force)
+            of_all = as_sent(
+                runs, findings.problem, of_all, chosen.effects, at_force=at_force
+            )
             forces = tuple(
                 force
                 for force, one in zip(of_all, findings.problem.signals, strict=True)

@@ -1,5 +1,6 @@
 """What a diagnosis added to a simulation, as one C file: a force for each of its steps."""
 
+from hwid_cli.diagnosis.stand_in import lag_before
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import drive_effects, parameter_vector
 from hwid_cli.errors import ConfigError
@@ -50,6 +51,13 @@ def effect_source(
     exported = ExportedSimulation(card, stand_in, sample_time_s, vector)
     effects = ", ".join(stand_in.effects) or "nothing"
     at_force = acts_at_force(extended)
+    lag = lag_before(plain, tuple(drive_effects(stand_in)))
+    if lag and not at_force:
+        raise ConfigError(
+            "--format c: simulation.force_input: missing, and forces act behind a lag of "
+            f"{lag:.3g} s that the simulation's input passes; expected an input "
+            "for forces; give the simulation one, or use --format python"
+        )
     acts_as = (
         "the force [N] that acts in that step"
         if at_force

@@ -296,6 +296,9 @@ class StandIn(Drive):
     one_curve_N_per_m : float, [N/m]
         Stiffness k that k2 and k3 belong to, where the spring is one curve that changes
         as a whole; 0 where k changes alone.
+    lag_s : float, [s]
+        Time constant of a lag that the simulation's input passes before it acts as a
+        force; 0 for none.
     own_units : MotionUnits
         Of the simulation.
     """
@@ -303,6 +306,7 @@ class StandIn(Drive):
     quadratic_N_per_m2: float = 0.0
     cubic_N_per_m3: float = 0.0
     one_curve_N_per_m: float = 0.0
+    lag_s: float = 0.0
     own_units: MotionUnits = field(default_factory=MotionUnits)
 
     @property

@@ -12,7 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from hwid_cli.diagnosis.held_force import is_held, mean_over_steps
+from hwid_cli.diagnosis.held_force import is_held
+from hwid_cli.diagnosis.input_lag import through_input
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.stand_in import (
     act_as_forces,
@@ -20,6 +21,7 @@ from hwid_cli.diagnosis.stand_in import (
     derived,
     force_beside,
     force_of_motion,
+    lag_before,
     moved_from,
     seen_start,
     starts_in_balance,
@@ -133,6 +135,7 @@ def _settled(
     """Run after run until simulation and drive agree; the one that agrees best."""
     plain, stand_in = drives
     is_mean = _is_held(simulate, request) if at_force else plain.hold == HELD
+    lag = 0.0 if at_force else lag_before(plain, tuple(drive_effects(stand_in)))
     given = simulate(request)
     signals = _standing(plain, given, request)
     best = ExtendedRun(given.output, given.velocity, np.inf)
@@ -141,7 +144,7 @@ def _settled(
         force = force_of_motion(plain, signals, motion)
         if not np.isfinite(force).all():
             break
-        sent = mean_over_steps(force) if is_mean else force
+        sent = through_input(force, lag, request.sample_time_s, is_held=is_mean)
         found = simulate(_pushed(request, sent, plain, at_force=at_force))
         late = found.output - signals.seen(motion) - signals.offset
         least = _NEGLIGIBLE * float(np.std(given.output))

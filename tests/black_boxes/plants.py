@@ -188,6 +188,21 @@ MOTOR = Plant(
     input="voltage_V",
     steps=8,
 )
+VALVE = Plant(
+    "valve",
+    """def rates(y, u, push, p):
+    x, v, z = y
+    push = push + p["kv"] * z
+    return v, (push - p["c"] * v - p["k"] * x) / p["m"], (u - z) / p["T"]
+""",
+    3,
+    {"m": 6.0, "c": 90.0, "k": 9000.0, "T": 0.02, "kv": 60.0},
+    ("c", "k", "kv"),
+    8.0,
+    6.0,
+    0.05,
+    input="valve_V",
+)
 PLANTS = {one.name: one for one in (LINEAR, PENDULUM, HARDENING, TWO_MASSES, MOTOR)}
 
 # No plain drive with a curved spring comes near to these.
@@ -219,6 +234,10 @@ AMPLIFIED = replace(
     return v, (force - p["c"] * v - p["k"] * x) / p["m"]
 """,
 )
+# Without an input for forces: all of the above, and one whose input lags behind.
+PUSHLESS = {
+    one.name: replace(one, has_force=False) for one in (*PLANTS.values(), VALVE)
+}
 FAR_PLANTS = {one.name: one for one in (RUBBING, YIELDING, AMPLIFIED)}
 
 

@@ -1,7 +1,7 @@
 """Diagnoses every black box and scores the verdicts.
 
 ``python -m tests.black_boxes.run_boxes --work DIR [--only PLANT/EFFECT ...] [--access python|outputs]
-[--speed] [--pairs] [--noise 0.005] [--log-noise 0.01] [--write FILE.md]``. Rows are appended to the file as they come; boxes that it
+[--speed] [--pairs] [--no-force] [--noise 0.005] [--log-noise 0.01] [--write FILE.md]``. Rows are appended to the file as they come; boxes that it
 holds are not run again.
 """
 
@@ -20,6 +20,7 @@ import numpy as np
 from tests.black_boxes.plants import (
     FAR_PLANTS,
     PLANTS,
+    PUSHLESS,
     hidden_in,
     integrate,
     pairs_in,
@@ -109,6 +110,8 @@ def _force_gain(rates, zero, plant):
         return plant.values["ke"] / plant.values["R"]
     if plant.name == "two_masses":
         return plant.values["kt"]
+    if plant.name == "valve":
+        return plant.values["kv"]
     return plant.mass * float(rates(zero, 1.0, 0.0, plant.values)[1])
 
 
@@ -227,13 +230,15 @@ def main():
         "--speed", action="store_true", help="its sensor is a tachometer"
     )
     parser.add_argument("--pairs", action="store_true", help="two effects at a time")
+    parser.add_argument("--no-force", action="store_true", help="no input for forces")
     parser.add_argument("--write", type=Path)
     options = parser.parse_args()
     kept = options.write.read_text() if options.write and options.write.exists() else ""
     if options.write and not kept:
         options.write.write_text(HEAD)
     words = []
-    for name, plant in (FAR_PLANTS if options.far else PLANTS).items():
+    plants = FAR_PLANTS if options.far else PUSHLESS if options.no_force else PLANTS
+    for name, plant in plants.items():
         make = pairs_in if options.pairs else hidden_in
         for effect in make(plant, 1.0, 1.0):
             label = f"{name}/{effect}"

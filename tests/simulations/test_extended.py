@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lsim
 
 from hwid_cli.errors import SimulationError
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import Drive, StandIn
 from hwid_cli.records.programs import PythonSimulation, RunRequest, SimulatorRun
 from hwid_cli.simulations import fmu
 from hwid_cli.simulations.extended import (
@@ -135,6 +135,38 @@ def test_friction_holds_where_the_simulation_starts(plain, is_in_balance):
 
 def rms(values):
     return np.sqrt(np.mean(np.square(values)))
+
+
+def behind_a_valve(request, friction=0.0, n_steps=20):
+    """The plant behind a lag of 10 ms; friction holds as in small steps."""
+    x = v = z = 0.0
+    step, found = STEP_S / n_steps, [0.0]
+    for before, after in pairwise(5.0 * request.input):
+        for share in (np.arange(n_steps) + 0.5) / n_steps:
+            z += step * (before + (after - before) * share - z) / 0.01
+            free = v + step * (z - 15 * v - 1184 * x) / 0.3
+            most = step * friction / 0.3
+            v = 0.0 if abs(free) <= most else free - np.sign(free) * most
+            x += step * v
+        found.append(x)
+    return SimulatorRun(np.array(found), np.zeros(0))
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["slow", "fast", "to and fro"])
+def test_friction_behind_a_lag_comes_through_the_input_in_time(name):
+    request = request_of(CURRENTS[name])
+    truth = behind_a_valve(request, FRICTION_N).output
+    before = behind_a_valve(request).output
+
+    def left(lag_s):
+        plain = StandIn(0.33, 12.0, 1100.0, 5.0, lag_s=lag_s)
+        drives = (plain, replace(plain, effects=FRICTION))
+        found = run_extended(behind_a_valve, request, drives, has_force=False)
+        return np.std(found.output - truth) / np.std(before - truth)
+
+    assert left(0.01) < 0.02
+    assert left(0.0) > 0.25
 
 
 def test_an_effect_that_does_nothing_in_a_recording_is_no_fault():
