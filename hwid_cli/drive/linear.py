@@ -112,7 +112,7 @@ class _Equations:
 
 def _add_mechanics(built: _Equations, p: np.ndarray) -> str:
     """Masses with springs and dampers; the velocity of what the force acts on."""
-    mass, motor = p[slots.MASS], "v"
+    mass, damper, motor = p[slots.MASS], p[slots.DAMPING], "v"
     if p[slots.COUPLING_STIFFNESS] > 0.0:
         motor, share = "motor_v", p[slots.COUPLING_SHARE]
         stiffness, inner = p[slots.COUPLING_STIFFNESS], share * mass
@@ -123,7 +123,10 @@ def _add_mechanics(built: _Equations, p: np.ndarray) -> str:
         bite = {"twist": stiffness, motor: damping, "v": -damping}
         built.rate("v", _times(bite, 1.0 / mass))
         built.rate(motor, _times(bite, -1.0 / inner))
-    built.rate("v", {"x": -p[slots.STIFFNESS] / mass, "v": -p[slots.DAMPING] / mass})
+        rubbing = p[slots.COUPLING_DAMPING_SHARE] * damper
+        built.rate(motor, {motor: -rubbing / inner})
+        damper -= rubbing
+    built.rate("v", {"x": -p[slots.STIFFNESS] / mass, "v": -damper / mass})
     built.rate("v", {"F": 1.0 / mass})
     if p[slots.MODE_MASS] > 0.0:
         damping = p[slots.MODE_DAMPING]

@@ -29,6 +29,8 @@ that is switched off is 0, except where the comment says infinite.
     GEAR_DAMPING_RATIO,
     GEAR_DAMPING,  # set by the simulation: of the teeth, in contact
     MOTOR_SHARE,
+    MOTOR_DAMPING_SHARE,
+    MOTOR_DAMPING,  # set by the simulation: of the damping, beside a motor of its own
     OUTPUT_GAP,
     MODE_MASS,
     MODE_STIFFNESS,
@@ -75,6 +77,7 @@ that is switched off is 0, except where the comment says infinite.
     COUPLING_STIFFNESS,
     COUPLING_SHARE,
     COUPLING_DAMPING_RATIO,
+    COUPLING_DAMPING_SHARE,
     SENSOR_AT_MOTOR,
     OUTPUT_LIMIT,  # infinite
     HUM_AMPLITUDE,
@@ -146,4 +149,4 @@ that is switched off is 0, except where the comment says infinite.
     SIDE_DASHPOT,
     SECOND_DASHPOT,
     N_SLOTS,
-) = range(138)
+) = range(141)

@@ -217,7 +217,7 @@ def test_what_completes_a_law_may_be_given(load_effect):
         ),
         (
             "gear_backlash: {half_gap_m: 1, stiffness_N_per_m: 9, motor_share: 1}",
-            r"motor_share: found 1.0; expected a share of the mass below 1",
+            r"motor_share: found 1.0; expected a share below 1",
         ),
         (
             "gear_backlash: {half_gap_m: 1, stiffness_N_per_m: 9, "

@@ -345,7 +345,12 @@ class _Run:
         if one.has("gear_backlash"):
             push = self._bite(y)
         net = push + one.value("constant_load", "force_N")
-        net -= one.damping * v + self._spring(y[X], v=v) + self.side * self.preload
+        rubbing = one.value("gear_backlash", "motor_damping_share")
+        net -= (
+            (1 - rubbing) * one.damping * v
+            + self._spring(y[X], v=v)
+            + self.side * self.preload
+        )
         net -= one.value("quadratic_drag", "drag_N_s2_per_m2") * v * abs(v)
         net -= one.value("hysteresis", "force_N") * y[YIELDED]
         if one.has("periodic_force"):
@@ -383,7 +388,8 @@ class _Run:
             mass -= inner
             out[MOTOR_X] = y[MOTOR_V]
             push = self._push(self._wanted(t, y), y)
-            out[MOTOR_V] = (push - self._bite(y)) / inner
+            rubbing = one.value("gear_backlash", "motor_damping_share") * one.damping
+            out[MOTOR_V] = (push - self._bite(y) - rubbing * y[MOTOR_V]) / inner
         is_held = (self.is_dry or one.has("hysteresis")) and self.way == 0.0
         if not is_held:
             out[X] = y[V]

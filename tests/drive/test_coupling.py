@@ -33,7 +33,7 @@ def coupled(sensor, **values):
     return {"elastic_coupling": VALUES | {"sensor": sensor} | values}
 
 
-def solved(stiffness=STIFFNESS, start=(0.0, 0.0)):
+def solved(stiffness=STIFFNESS, start=(0.0, 0.0), rubbing=0.0):
     """States xm, vm, x, v at the samples."""
     motor, load = SHARE * MASS, (1 - SHARE) * MASS
     damping = 2 * RATIO * np.sqrt(COUPLING * motor * load / MASS)
@@ -41,8 +41,13 @@ def solved(stiffness=STIFFNESS, start=(0.0, 0.0)):
     def rate(t, z):
         push = CONSTANT * np.interp(t, CORNER_TIMES_S, CORNERS)
         pull = COUPLING * (z[0] - z[2]) + damping * (z[1] - z[3])
-        held = stiffness * z[2] + DAMPING * z[3]
-        return [z[1], (push - pull) / motor, z[3], (pull - held) / load]
+        held = stiffness * z[2] + (DAMPING - rubbing) * z[3]
+        return [
+            z[1],
+            (push - pull - rubbing * z[1]) / motor,
+            z[3],
+            (pull - held) / load,
+        ]
 
     state = np.array([start[0], start[1], start[0], start[1]])
     found = [state[:, None]]
@@ -65,6 +70,14 @@ def test_the_load_follows_two_masses_on_a_spring():
     assert rms(found.output - expected[2]) < SOLVED_M
     # Per second of a motion of 1 m/s.
     assert rms(found.velocity - expected[3]) < 100 * SOLVED_M
+
+
+@pytest.mark.parametrize(("sensor", "row"), [("motor", 0), ("load", 2)])
+def test_a_part_of_the_damping_may_brake_the_motor(sensor, row):
+    expected = solved(rubbing=0.6 * DAMPING)
+    found = tool(coupled(sensor, motor_damping_share=0.6))
+    assert rms(found.output - expected[row]) < SOLVED_M
+    assert rms(solved()[row] - expected[row]) > 1e4 * SOLVED_M
 
 
 def test_the_sensor_may_be_at_the_motor():

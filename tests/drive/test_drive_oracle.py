@@ -193,3 +193,17 @@ def test_a_given_start_follows_the_oracle(effect):
     effects = {effect: SINGLE[effect]}
     expected = RATTLING_M if effects == GEAR else tolerance({effect: SINGLE[effect]})
     assert difference(effects, start=(0.004, -0.3)) < expected
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("motor_share", [0.05, 0.3])
+@pytest.mark.parametrize("other", [{}, CUBIC, COULOMB], ids=["", "cubic", "coulomb"])
+def test_a_part_of_the_damping_may_brake_the_motor_of_a_gear(other, motor_share):
+    gear = {
+        **GEAR["gear_backlash"],
+        "motor_share": motor_share,
+        "motor_damping_share": 0.4,
+    }
+    effects = {"gear_backlash": gear, **other}
+    # Beside friction it rattles.
+    assert difference(effects) < max(tolerance(effects), RATTLING_M)

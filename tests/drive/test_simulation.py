@@ -402,6 +402,7 @@ def test_a_drive_is_told_with_the_defaults_of_what_it_leaves_out():
     told = drive_effects(Drive(effects={"gear_backlash": gear}))
     assert told["gear_backlash"] == gear | {
         "motor_share": 0.5,
+        "motor_damping_share": 0.0,
         "contact_damping_ratio": 0.0,
     }
     own = {"amplitude_N": 1.0, "frequency_Hz": 9.0}

@@ -128,12 +128,26 @@ def _shares(least: float) -> Callable[[Scales], tuple[float, float]]:
 
 
 # The load has the rest.
-_BELOW_WHOLE = Limit("a share of the mass below 1", lambda value: value < 1)
+_BELOW_WHOLE = Limit("a share below 1", lambda value: value < 1)
+
+
+def _motor_damping(place: str) -> Parameter:
+    """Share of the damping that brakes the motor, as its own bearing does."""
+    return Parameter(
+        "motor_damping_share",
+        lambda scales: (0.1,),
+        lambda scales: (0.0, 0.95),
+        is_positive=False,
+        places=(place,),
+        default=0.0,
+        limits=(NOT_NEGATIVE, _BELOW_WHOLE),
+    )
+
 
 GEAR = Effect(
     id="gear_backlash",
     sentence="play between motor and load: teeth that let go and hit again",
-    equation="m1 xm'' = kt i - T, m2 x'' = T - c x' - k x; "
+    equation="m1 xm'' = kt i - T - s c xm', m2 x'' = T - (1 - s) c x' - k x; "
     "T = kg (xm - x -+ g) + cg (xm' - x') while it pushes, else 0",
     enters="motion",
     parameters=(
@@ -160,6 +174,7 @@ GEAR = Effect(
             default=0.5,
             limits=(POSITIVE, _BELOW_WHOLE),
         ),
+        _motor_damping("MOTOR_DAMPING_SHARE"),
         # Without any, the teeth rattle chaotically.
         Parameter(
             "contact_damping_ratio",
@@ -251,6 +266,7 @@ _ELASTIC_STATED = (
     Stated("stiffness_N_per_m", (POSITIVE,)),
     Stated("sensor", words=("motor", "load")),
     Stated("motor_share", (POSITIVE, _BELOW_WHOLE), is_needed=False),
+    Stated("motor_damping_share", (NOT_NEGATIVE, _BELOW_WHOLE), is_needed=False),
     Stated("damping_ratio", (NOT_NEGATIVE,), is_needed=False),
 )
 
@@ -261,7 +277,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
         id=f"elastic_coupling:{sensor}",
         sentence="a shaft or belt that gives way between motor and load; "
         f"the sensor is at the {sensor}",
-        equation="m1 xm'' = kt i - T, m2 x'' = T - c x' - k x; "
+        equation="m1 xm'' = kt i - T - s c xm', m2 x'' = T - (1 - s) c x' - k x; "
         "T = kc (xm - x) + cc (xm' - x'), "
         f"y = {'xm' if sensor == 'motor' else 'x'}",
         enters="motion",
@@ -281,6 +297,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
                 default=0.5,
                 limits=(POSITIVE, _BELOW_WHOLE),
             ),
+            _motor_damping("COUPLING_DAMPING_SHARE"),
             Parameter(
                 "damping_ratio",
                 lambda scales: (0.05,),

@@ -108,7 +108,8 @@ def net_forces(
         rubbing = memory[WAY] * p[slots.DRIVE_SHARE] * abs(force)
     if p[slots.GEAR_STIFFNESS] > 0.0:
         teeth = bite(x_motor - x, v_motor - v, p)
-        motor = (force - teeth) / (p[slots.MOTOR_SHARE] * p[slots.MASS])
+        motor = force - teeth - p[slots.MOTOR_DAMPING] * v_motor
+        motor /= p[slots.MOTOR_SHARE] * p[slots.MASS]
         force = teeth
     net = force + value_of(push, OTHER, done) - resisting(x, v, memory, p)
     if rubbing != 0.0:

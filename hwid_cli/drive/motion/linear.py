@@ -48,7 +48,7 @@ def fastest(p: np.ndarray) -> float:
         share = p[slots.MOTOR_SHARE]
         mass *= min(share, 1.0 - share)
         stiffness += p[slots.GEAR_STIFFNESS]
-        damping += p[slots.GEAR_DAMPING]
+        damping += p[slots.GEAR_DAMPING] + p[slots.MOTOR_DAMPING]
     if p[slots.CLIP_LIMIT] < np.inf:
         damping += p[slots.FORCE_CONSTANT] * p[slots.CLIP_SLOPE]
     if p[slots.RESISTANCE] > 0.0:
@@ -101,6 +101,7 @@ def sum_series(
     mass = p[slots.MASS] - inner if has_motor else p[slots.MASS]
     part = p[slots.MODE_MASS] if has_mode else 1.0
     teeth_damping = p[slots.GEAR_DAMPING] if teeth > 0.0 else 0.0
+    motor_damping = p[slots.MOTOR_DAMPING]
     count = max(1, int(np.ceil(length * rate / LONGEST_SUM)))
     h = length / count
     n_terms = FEW_TERMS if h * rate <= SHORT_SUM else N_TERMS
@@ -136,7 +137,7 @@ def sum_series(
             am = 0.0
             if has_motor:
                 bite = teeth * (xm - x) + teeth_offset * one + teeth_damping * (vm - v)
-                am = (force - bite) / inner
+                am = (force - bite - motor_damping * vm) / inner
                 force = bite
             net = force + other - offset * one - damping * v - k * x
             ap = 0.0

@@ -280,6 +280,8 @@ def _start(
         swinging = p[slots.MASS] * p[slots.MOTOR_SHARE] * (1.0 - p[slots.MOTOR_SHARE])
         p[slots.GEAR_DAMPING] = 2.0 * p[slots.GEAR_DAMPING_RATIO]
         p[slots.GEAR_DAMPING] *= np.sqrt(p[slots.GEAR_STIFFNESS] * swinging)
+        p[slots.MOTOR_DAMPING] = p[slots.MOTOR_DAMPING_SHARE] * p[slots.DAMPING]
+        p[slots.DAMPING] -= p[slots.MOTOR_DAMPING]
     driving = resting_force(state[X], current, p)
     state[MOTOR_X] = state[X]
     if p[slots.GEAR_STIFFNESS] > 0.0 and driving != 0.0:
@@ -306,13 +308,15 @@ def _couple(p: np.ndarray) -> None:
     stiffness, teeth = p[slots.COUPLING_STIFFNESS], p[slots.GEAR_STIFFNESS]
     if stiffness <= 0.0:
         return
-    share = p[slots.COUPLING_SHARE]
+    share, rubbing = p[slots.COUPLING_SHARE], p[slots.COUPLING_DAMPING_SHARE]
     if teeth > 0.0:
         stiffness *= teeth / (stiffness + teeth)
         share = 0.5 * (share + p[slots.MOTOR_SHARE])
+        rubbing = 0.5 * (rubbing + p[slots.MOTOR_DAMPING_SHARE])
     else:
         p[slots.IS_COUPLED] = 1.0
     p[slots.GEAR_STIFFNESS], p[slots.MOTOR_SHARE] = stiffness, share
+    p[slots.MOTOR_DAMPING_SHARE] = rubbing
     p[slots.GEAR_DAMPING_RATIO] += p[slots.COUPLING_DAMPING_RATIO]
 
 
