@@ -138,7 +138,7 @@ def resonance_starts(
     nearest = _different(begun)[:_N_GO_ON]
     found = [search.go_on(at, _NEXT_STEPS, by_shares=True)[1] for at in nearest]
     ended = [search.go_on(at, _LAST_STEPS, by_shares=False) for at in found]
-    starts = tuple(search.start(at) for at in _different(ended)[:_N_STARTS])
+    starts = tuple(search.start_of_all(at) for at in _different(ended)[:_N_STARTS])
     return ResonanceStarts(starts)
 
 
@@ -204,13 +204,19 @@ def _different(found: Sequence[tuple[float, np.ndarray]]) -> list[np.ndarray]:
 
 
 class _Search:
-    """Search in spectra, over the logarithms of all parameters."""
+    """Search in spectra, over the logarithms of all positive parameters."""
 
     def __init__(self, drive: Drive, effect: str, scales: Scales, lines: Lines) -> None:
         self._drive, self._effect, self._lines = drive, effect, lines
         self._base = [one for one in drive.fitted_base if getattr(drive, one) != 0.0]
-        parameters = CATALOGUE[effect].parameters
+        # What spectra hardly show is none here, and goes on from where its search begins.
+        parameters = [one for one in CATALOGUE[effect].parameters if one.is_positive]
         self._names = [one.name for one in parameters]
+        self._others = {
+            one.name: one.starts(scales)[0]
+            for one in CATALOGUE[effect].parameters
+            if not one.is_positive
+        }
         sizes = [abs(getattr(drive, one)) for one in self._base]
         ends = [(one * np.exp(-_REACH), one * np.exp(_REACH)) for one in sizes]
         ends += [one.bounds(scales) for one in parameters]
@@ -233,6 +239,12 @@ class _Search:
         }
         own = dict(zip(self._names, sizes[len(self._base) :], strict=True))
         return SearchStart(base, {self._effect: own})
+
+    def start_of_all(self, coordinates: np.ndarray) -> SearchStart:
+        """The same with what spectra hardly show."""
+        seen = self.start(coordinates)
+        own = {**seen.effects[self._effect], **self._others}
+        return replace(seen, effects={self._effect: own})
 
     def go_on(
         self, coordinates: np.ndarray, steps: int, *, by_shares: bool
