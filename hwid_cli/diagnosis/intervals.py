@@ -11,6 +11,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate import rebuilt
 from hwid_cli.diagnosis.parameters import (
+    BASE,
     ParameterLayout,
     ParameterPoint,
     Unknown,
@@ -19,7 +20,7 @@ from hwid_cli.diagnosis.parameters import (
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.search import local_matrix, matrix_beside_pushes
-from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.effect import Scales
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 
@@ -27,6 +28,11 @@ from hwid_cli.records.candidates import CandidateFit, ParameterRef
 QUANTILE = 1.96
 # What swings all the time, and how near frequencies are to multiples of one, [-].
 _SWINGS, _OF_ONE_FREQUENCY = ("periodic_force", "sensor_hum"), 0.005
+# Stops, what bends a spring as well, and the stiffness over that of the spring below which a
+# stop is no more than that; residuals that go together so much are no noise, [-].
+_STOPS = ("end_stop", "one_sided_stop")
+_BEND = ("cubic_stiffness", "quadratic_stiffness", "spring_gap", *_STOPS)
+_SOFT, _GO_TOGETHER = 2.0, 0.5
 # Share of the best determined direction below which one counts as undetermined.
 _DETERMINED = 1e-12
 # A strength that is so near its bound would go farther, [-].
@@ -73,11 +79,11 @@ def unclear_effects(
         own = CATALOGUE[effect].told_by
         return tuple(one for one in refs if not is_shared or one.parameter == own)
 
-    of_one = harmonics(found)
+    imitating = (*harmonics(found), *soft_stops(problem, found))
     return tuple(
         effect
         for effect in found.effects
-        if effect in of_one or not all(map(is_clear, telling(effect)))
+        if effect in imitating or not all(map(is_clear, telling(effect)))
     )
 
 
@@ -97,6 +103,27 @@ def harmonics(found: CandidateFit) -> tuple[str, ...]:
     ratio = frequencies[fast] / frequencies[slow]
     is_multiple = ratio > 1.5 and abs(ratio / round(ratio) - 1.0) < _OF_ONE_FREQUENCY
     return (fast,) if is_multiple else ()
+
+
+def soft_stops(problem: DiagnosisProblem, found: CandidateFit) -> tuple[str, ...]:
+    """Stops that bend the spring in place of a smooth law.
+
+    Softer than twice the spring, a stop is a corner in it. Beside another law of the spring,
+    or where what is left is no noise, that corner stands for a curve.
+    """
+    values = dict(zip(found.names, found.values, strict=True))
+    own = ParameterRef(BASE, "stiffness_N_per_m")
+    spring = values.get(own, problem.drive.stiffness_N_per_m)
+    bent = [one for one in found.effects if public_id(one) in _BEND]
+    if spring <= 0 or not (len(bent) > 1 or found.neighbour > _GO_TOGETHER):
+        return ()
+    return tuple(
+        one
+        for one in bent
+        if public_id(one) in _STOPS
+        and not values.get(ParameterRef(one, "exponent"), 1.0) > 1.0
+        and values[ParameterRef(one, "stiffness_N_per_m")] < _SOFT * spring
+    )
 
 
 def _contained(

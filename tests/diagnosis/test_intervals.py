@@ -10,6 +10,7 @@ from hwid_cli.diagnosis.intervals import (
     intervals,
     runs_to_bound,
     shared_covariance,
+    soft_stops,
     unclear_effects,
 )
 from hwid_cli.records.candidates import ParameterRef
@@ -162,3 +163,32 @@ def test_a_hum_at_a_multiple_of_a_force_may_be_its_harmonic(force_Hz, hum_Hz, un
     assert harmonics(pair) == unclear
     alone = replace(found, names=names[:1], values=np.array([force_Hz]))
     assert harmonics(alone) == ()
+
+
+@pytest.mark.parametrize(
+    ("effects", "stiffness", "neighbour", "soft"),
+    [
+        (("end_stop",), 1.5, 0.9, ("end_stop",)),
+        (("end_stop:dashpot", "cubic_stiffness"), 1.5, 0.0, ("end_stop:dashpot",)),
+        # A corner that leaves noise is one.
+        (("end_stop",), 1.5, 0.1, ()),
+        (("one_sided_stop", "coulomb_friction"), 1.5, 0.1, ()),
+        # Harder than the spring.
+        (("end_stop", "cubic_stiffness"), 5.0, 0.9, ()),
+    ],
+)
+def test_a_stop_softer_than_the_spring_may_stand_for_a_curve(
+    effects, stiffness, neighbour, soft
+):
+    given = problem(recordings())
+    spring = given.drive.stiffness_N_per_m
+    names = tuple(ParameterRef(one, "stiffness_N_per_m") for one in effects)
+    found = replace(
+        made_up(effects, 1.0),
+        names=names,
+        values=np.full(len(names), stiffness * spring),
+        neighbour=neighbour,
+    )
+    assert soft_stops(given, found) == soft
+    free = replace(given, drive=replace(given.drive, stiffness_N_per_m=0.0))
+    assert soft_stops(free, found) == ()
