@@ -56,7 +56,9 @@ def confirm(
     found, criteria = _with_run(findings, best), findings.criteria
     run = found.verdict.chosen
     is_enough = is_as_good(best) or criteria.is_nearly_all(run, findings.base)
-    may_be_named = not (criteria.replaces(run) or criteria.imitates_one_law(run))
+    # Where the simulation's own parameters have moved, another drive stands for it.
+    beside = criteria.beside(best.problem.drive)
+    may_be_named = not (beside.replaces(run) or criteria.imitates_one_law(run))
     may_be_named = may_be_named and _explains(findings, run)
     if is_enough and may_be_named:
         return _beside_rivals(findings, found, best, runs), best.values_of_run, True

@@ -87,7 +87,7 @@ from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE, Diagnosis, NoiseFloor
-from hwid_cli.records.drive import LINE
+from hwid_cli.records.drive import LINE, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.own_effects import own_ids
 from hwid_cli.records.recordings import Recording
@@ -678,6 +678,7 @@ def allowed_effects(
     present = drive_effects(problem.drive)
     has_spring = problem.drive.stiffness_N_per_m > 0
     has_circuit = problem.drive.resistance_ohm is not None
+    stands_in = isinstance(problem.drive, StandIn)
     several = len(problem.part(held_out=False).signals) > 2
     own = {one: CATALOGUE[one] for one in own_ids(options.own_effects)}
     return tuple(
@@ -688,6 +689,7 @@ def allowed_effects(
         and may_be_added(name, {*present, effect.beside})
         and (has_spring or not effect.needs_spring)
         and not (has_spring and effect.needs_free_axis)
+        and (stands_in or not effect.needs_stand_in)
         and (has_circuit or not effect.needs_circuit)
         and (several or not any(one.is_factor for one in effect.parameters))
         and not (problem.compares_command and effect.enters == "output")

@@ -7,7 +7,7 @@ docs/method_diagnosis.md, eq. (D21) to (D24).
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import inf
 
@@ -25,7 +25,7 @@ from hwid_cli.records.diagnosis import (
     STILL_LARGE,
     NoiseFloor,
 )
-from hwid_cli.records.drive import StandIn
+from hwid_cli.records.drive import Drive, StandIn
 
 # A set of effects must lower the criterion by this much against the smaller one.
 LEAST_GAIN = 10.0
@@ -402,6 +402,16 @@ class SelectionCriteria:
         """Whether a set of several effects leaves more than such sets may."""
         is_far = len(found.effects) > 1 and self.ratio(found) > MOST_LEFT_BY_SET
         return is_far and not self.leaves_noise(found)
+
+    def beside(self, drive: Drive) -> "SelectionCriteria":
+        """The same where another drive stands for the simulation.
+
+        Parameters
+        ----------
+        drive : Drive
+            Of a simulation whose own parameters have moved; another one changes nothing.
+        """
+        return replace(self, standing=drive) if isinstance(drive, StandIn) else self
 
     def replaces(self, found: CandidateFit) -> bool:
         """Whether a candidate puts another base in the place of the simulation's.

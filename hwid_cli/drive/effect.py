@@ -369,6 +369,8 @@ class Effect:
         Whether it means nothing on a free axis.
     needs_free_axis : bool
         Whether a spring has an entry of its own for it.
+    needs_stand_in : bool
+        Whether only a drive that stands for another simulation may lack it.
     needs_circuit : bool
         Whether it means nothing where the input is the current.
     seen : callable or None
@@ -419,6 +421,7 @@ class Effect:
     contains: tuple[str, ...] = ()
     needs_spring: bool = False
     needs_free_axis: bool = False
+    needs_stand_in: bool = False
     needs_circuit: bool = False
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
     resonant: Callable[[float, Scales], tuple[dict[str, float], ...]] | None = None

@@ -119,6 +119,8 @@ that is switched off is 0, except where the comment says infinite.
     SECOND_COGGING_PHASE,
     GRAVITY_TORQUE,
     GRAVITY_ANGLE,
+    GRAVITY_IS_SETTLED,  # 1 where it counts from the start
+    GRAVITY_REST,  # set by the simulation: what has settled at the start
     RIPPLE_SHARE,
     RIPPLE_PER_TURN,
     RIPPLE_PHASE,
@@ -149,4 +151,4 @@ that is switched off is 0, except where the comment says infinite.
     SIDE_DASHPOT,
     SECOND_DASHPOT,
     N_SLOTS,
-) = range(141)
+) = range(143)

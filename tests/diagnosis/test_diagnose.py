@@ -7,7 +7,7 @@ import pytest
 from hwid_cli.diagnosis.diagnose import allowed_effects, diagnose
 from hwid_cli.diagnosis.problem import held_out_names
 from hwid_cli.drive.catalogue import CATALOGUE
-from hwid_cli.records.drive import Controller
+from hwid_cli.records.drive import Controller, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions
 from tests.diagnosis.small_drive import DRIVE, in_turn, problem, recordings, simulation
 from tests.stages.diagnosed_drive import FEW, FRICTION, diagnosed
@@ -59,6 +59,7 @@ def test_tasks_that_are_kept_differ_in_their_content():
 
 OF_CIRCUIT = {name for name, one in CATALOGUE.items() if one.needs_circuit}
 OF_FREE_AXIS = {name for name, one in CATALOGUE.items() if one.needs_free_axis}
+OF_STAND_IN = {name for name, one in CATALOGUE.items() if one.needs_stand_in}
 
 
 @pytest.mark.parametrize(
@@ -83,13 +84,22 @@ def test_what_makes_no_sense_for_a_drive_is_not_tried(changes, lost):
     of = problem(recordings(), **changes)
     allowed = set(allowed_effects(of, DiagnoseOptions()))
     assert lost
-    assert allowed == {name for name in CATALOGUE if name not in lost | OF_CIRCUIT}
+    lost = lost | OF_CIRCUIT | OF_STAND_IN
+    assert allowed == {name for name in CATALOGUE if name not in lost}
+
+
+def test_a_drive_that_stands_for_a_simulation_may_start_settled():
+    given = problem(recordings())
+    drive = StandIn(0.3, 15.0, 1184.0, 5.0)
+    allowed = set(allowed_effects(replace(given, drive=drive), DiagnoseOptions()))
+    assert {"gravity:settled"} == OF_STAND_IN
+    assert allowed >= OF_STAND_IN
 
 
 def test_a_circuit_may_have_an_inductance():
     of = problem(recordings(), resistance_ohm=2.0)
     allowed = allowed_effects(of, DiagnoseOptions())
-    assert set(CATALOGUE) - set(allowed) == OF_FREE_AXIS
+    assert set(CATALOGUE) - set(allowed) == OF_FREE_AXIS | OF_STAND_IN
     assert list(OF_CIRCUIT) == ["winding_inductance"]
 
 

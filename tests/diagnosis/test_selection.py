@@ -25,7 +25,7 @@ from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide, lead
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.diagnosis import VERDICTS
-from hwid_cli.records.drive import StandIn
+from hwid_cli.records.drive import Drive, StandIn
 from tests.diagnosis.made_up_fits import CRITERIA, HELD_OUT, base, made_up
 from tests.diagnosis.small_drive import problem, recordings, white
 
@@ -862,6 +862,15 @@ def test_an_effect_beside_which_the_stand_in_becomes_another_drive_is_not_named(
         assert not criteria.may_be_named(far, base())
         # A drive whose parameters were only guessed may be far off.
         assert CRITERIA.may_be_named(far, base())
+
+
+def test_a_simulation_whose_own_parameters_have_moved_is_replaced_by_nothing():
+    """What had been imitated has led its gain to a fifth; the run has led it back."""
+    criteria = replace(CRITERIA, standing=StandIn(force_constant_N_per_A=1.4))
+    run = with_base(made_up(GOOD, 150.0), force_constant_N_per_A=7.0)
+    assert criteria.replaces(run)
+    assert not criteria.beside(StandIn(force_constant_N_per_A=7.0)).replaces(run)
+    assert criteria.beside(Drive()) is criteria
 
 
 @pytest.mark.parametrize(("stiffness", "is_named"), [(309.0, True), (311.0, False)])

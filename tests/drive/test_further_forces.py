@@ -61,6 +61,21 @@ def test_a_pendulum_keeps_its_energy():
     assert np.ptp(energy) < 1e-5 * np.ptp(0.01 * motion.velocity**2)
 
 
+@pytest.mark.parametrize("start", [0.0, 0.9])
+def test_a_settled_weight_counts_from_where_the_arm_starts(start):
+    """As the weight beside a constant torque that has held it."""
+    gravity = {"torque_N_m": 3.0, "angle_rad": 0.4}
+    settled = {"gravity": {**gravity, "counts_from": "start"}}
+    held = 3.0 * np.sin(start + 0.4)
+    beside = {"gravity": gravity, "constant_load": {"force_N": held}}
+    for first in ((start, 0.0), (start, 2.0)):
+        found = free_axis(settled, 800, start=first, damping=0.05)
+        expected = free_axis(beside, 800, start=first, damping=0.05)
+        np.testing.assert_allclose(found.position, expected.position, atol=1e-9)
+    at_rest = free_axis(settled, 300, start=(start, 0.0))
+    np.testing.assert_allclose(at_rest.position, start, atol=1e-9)
+
+
 def test_a_free_arm_begins_where_the_recording_does_and_falls():
     effects = {"gravity": {"torque_N_m": 3.0, "angle_rad": 0.0}}
     drive = Drive(mass_kg=0.02, damping_N_s_per_m=0.1, effects=effects)

@@ -415,6 +415,23 @@ GRAVITY = Effect(
     contains=("constant_load",),
 )
 
+# A loop with an integral part has settled against the weight before a recording begins, and
+# a simulation of it starts as if it had.
+GRAVITY_SETTLED = replace(
+    GRAVITY,
+    id="gravity:settled",
+    equation="F = -G (sin(x + x0) - sin(x(0) + x0))",
+    derived={"GRAVITY_IS_SETTLED": lambda values: 1.0},
+    stated=(
+        Stated("torque_N_m", (NOT_NEGATIVE,)),
+        Stated("angle_rad"),
+        Stated("counts_from", words=("start",), is_needed=False),
+    ),
+    words={"counts_from": "start"},
+    contains=(),
+    needs_stand_in=True,
+)
+
 PRELOAD = Effect(
     id="spring_preload",
     sentence="a preloaded spring: nothing moves from the middle below a force",
@@ -471,5 +488,6 @@ EFFECTS = (
     COGGING_ABOUT_MEAN,
     COGGING_SECOND,
     GRAVITY,
+    GRAVITY_SETTLED,
     LOAD,
 )

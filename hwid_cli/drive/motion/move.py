@@ -266,6 +266,9 @@ def _start(
         state[CIRCUIT] = current
     if p[slots.COGGING_ABOUT_MEAN] == 0.0:
         p[slots.COGGING_REST] = np.sin(p[slots.COGGING_PHASE])
+    if p[slots.GRAVITY_IS_SETTLED] > 0.0:
+        angle = p[slots.START_POSITION] + p[slots.GRAVITY_ANGLE]
+        p[slots.GRAVITY_REST] = p[slots.GRAVITY_TORQUE] * np.sin(angle)
     if p[slots.STIFFNESS] > 0.0:
         p[slots.COGGING_ORIGIN] = resting_point(0.0, False, p)
     if p[slots.IS_START_GIVEN] > 0.0:

@@ -46,6 +46,7 @@ def resting_point(current: float, has_cogging: bool, p: np.ndarray) -> float:
         return p[slots.START_POSITION]
     force = resting_force(0.0, current, p) + p[slots.LOAD]
     force -= p[slots.GRAVITY_TORQUE] * np.sin(p[slots.GRAVITY_ANGLE])
+    force += p[slots.GRAVITY_REST]
     if p[slots.OWN_FORCE] != 0.0:
         force += own_force_at_rest(0.0, _command_at(current, p), p)
     if abs(force) <= p[slots.PRELOAD]:

@@ -48,6 +48,7 @@ def further_spring(x: float, p: np.ndarray) -> float:
     force = 0.0
     if p[slots.GRAVITY_TORQUE] != 0.0:
         force += p[slots.GRAVITY_TORQUE] * np.sin(x + p[slots.GRAVITY_ANGLE])
+        force -= p[slots.GRAVITY_REST]
     if p[slots.SECOND_STIFFNESS] > 0.0:
         into = beyond_side(x, p[slots.SECOND_POSITION])
         force += p[slots.SECOND_STIFFNESS] * bent(into, p[slots.SECOND_BEND])

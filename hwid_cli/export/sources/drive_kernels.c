@@ -113,35 +113,37 @@ enum {
     SECOND_COGGING_PHASE = 109,
     GRAVITY_TORQUE = 110,
     GRAVITY_ANGLE = 111,
-    RIPPLE_SHARE = 112,
-    RIPPLE_PER_TURN = 113,
-    RIPPLE_PHASE = 114,
-    HYSTERESIS_RATIO = 115,
-    HYSTERESIS_BEND = 116,
-    OWN_PILE = 117,
-    OWN_FORCE = 118,
-    OWN_INPUT = 119,
-    OWN_OUTPUT = 120,
-    OWN_FRICTION = 121,
-    OWN_WAVES = 122,
-    OWN_TURNING = 123,
-    OWN_FINENESS = 124,
-    OWN_JUMPS = 125,
-    OWN_BENDS = 126,
-    SAMPLE_TIME = 127,
-    LAG_DAMPING_RATIO = 128,
-    SENSOR_LAG = 129,
-    HAS_BRISTLES = 130,
-    BRISTLE_VELOCITY = 131,
-    BRISTLE_DAMPING = 132,
-    BRISTLE_EXCESS = 133,
-    SENSOR_LAG_DAMPING_RATIO = 134,
-    IRON = 135,
-    IS_STRIBECK_EXPONENTIAL = 136,
-    STOP_DASHPOT = 137,
-    SIDE_DASHPOT = 138,
-    SECOND_DASHPOT = 139,
-    N_SLOTS = 140,
+    GRAVITY_IS_SETTLED = 112,
+    GRAVITY_REST = 113,
+    RIPPLE_SHARE = 114,
+    RIPPLE_PER_TURN = 115,
+    RIPPLE_PHASE = 116,
+    HYSTERESIS_RATIO = 117,
+    HYSTERESIS_BEND = 118,
+    OWN_PILE = 119,
+    OWN_FORCE = 120,
+    OWN_INPUT = 121,
+    OWN_OUTPUT = 122,
+    OWN_FRICTION = 123,
+    OWN_WAVES = 124,
+    OWN_TURNING = 125,
+    OWN_FINENESS = 126,
+    OWN_JUMPS = 127,
+    OWN_BENDS = 128,
+    SAMPLE_TIME = 129,
+    LAG_DAMPING_RATIO = 130,
+    SENSOR_LAG = 131,
+    HAS_BRISTLES = 132,
+    BRISTLE_VELOCITY = 133,
+    BRISTLE_DAMPING = 134,
+    BRISTLE_EXCESS = 135,
+    SENSOR_LAG_DAMPING_RATIO = 136,
+    IRON = 137,
+    IS_STRIBECK_EXPONENTIAL = 138,
+    STOP_DASHPOT = 139,
+    SIDE_DASHPOT = 140,
+    SECOND_DASHPOT = 141,
+    N_SLOTS = 142,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -1283,6 +1285,7 @@ static double drive_further_spring(double x, double *p)
     force = 0.0;
     if (p[GRAVITY_TORQUE] != 0.0) {
         force += p[GRAVITY_TORQUE] * sin(x + p[GRAVITY_ANGLE]);
+        force -= p[GRAVITY_REST];
     }
     if (p[SECOND_STIFFNESS] > 0.0) {
         into = drive_beyond_side(x, p[SECOND_POSITION]);
@@ -1789,6 +1792,7 @@ static double drive_resting_point(double current, int has_cogging, double *p)
     }
     force = drive_resting_force(0.0, current, p) + p[LOAD];
     force -= p[GRAVITY_TORQUE] * sin(p[GRAVITY_ANGLE]);
+    force += p[GRAVITY_REST];
     if (p[OWN_FORCE] != 0.0) {
         force += drive_own_force_at_rest(0.0, drive_command_at(current, p), p);
     }
@@ -3707,6 +3711,7 @@ static double drive_start(double *state, double *memory, double command, double 
 {
     int has_winding = 0;
     double current = 0.0;
+    double angle = 0.0;
     double swinging = 0.0;
     double driving = 0.0;
     int is_placed = 0;
@@ -3726,6 +3731,10 @@ static double drive_start(double *state, double *memory, double command, double 
     }
     if (p[COGGING_ABOUT_MEAN] == 0.0) {
         p[COGGING_REST] = sin(p[COGGING_PHASE]);
+    }
+    if (p[GRAVITY_IS_SETTLED] > 0.0) {
+        angle = p[START_POSITION] + p[GRAVITY_ANGLE];
+        p[GRAVITY_REST] = p[GRAVITY_TORQUE] * sin(angle);
     }
     if (p[STIFFNESS] > 0.0) {
         p[COGGING_ORIGIN] = drive_resting_point(0.0, 0, p);
