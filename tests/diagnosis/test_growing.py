@@ -30,6 +30,7 @@ PLAY = {
     "half_gap_m": 3e-4,
     "stiffness_N_per_m": 2e5,
     "motor_share": 0.25,
+    "motor_damping_share": 0.1,
     "contact_damping_ratio": 0.137,
 }
 GEAR = ("gear_backlash",)

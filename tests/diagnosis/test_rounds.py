@@ -47,7 +47,7 @@ class Watched:
     def effects_of(self, function):
         """Sets of effects of the tasks with a function, in their order."""
         return [
-            tuple(one.content["effects"])
+            tuple(one.arguments[1])
             for one, _ in self.tasks
             if one.function.__name__ == function
         ]

@@ -266,18 +266,26 @@ _ELASTIC_STATED = (
     Stated("stiffness_N_per_m", (POSITIVE,)),
     Stated("sensor", words=("motor", "load")),
     Stated("motor_share", (POSITIVE, _BELOW_WHOLE), is_needed=False),
-    Stated("motor_damping_share", (NOT_NEGATIVE, _BELOW_WHOLE), is_needed=False),
     Stated("damping_ratio", (NOT_NEGATIVE,), is_needed=False),
+)
+_BRAKED_STATED = Stated(
+    "motor_damping_share", (NOT_NEGATIVE, _BELOW_WHOLE), is_needed=False
 )
 
 
 def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
-    """One entry of the elastic coupling, by the place of the sensor."""
+    """One entry of the elastic coupling, by the place of the sensor.
+
+    At the load it does not tell which part of the damping brakes the motor.
+    """
+    braked = (_motor_damping("COUPLING_DAMPING_SHARE"),) if sensor == "motor" else ()
+    stated = (_BRAKED_STATED,) if sensor == "motor" else ()
+    at_motor, at_load = (" - s c xm'", "(1 - s) ") if braked else ("", "")
     return Effect(
         id=f"elastic_coupling:{sensor}",
         sentence="a shaft or belt that gives way between motor and load; "
         f"the sensor is at the {sensor}",
-        equation="m1 xm'' = kt i - T - s c xm', m2 x'' = T - (1 - s) c x' - k x; "
+        equation=f"m1 xm'' = kt i - T{at_motor}, m2 x'' = T - {at_load}c x' - k x; "
         "T = kc (xm - x) + cc (xm' - x'), "
         f"y = {'xm' if sensor == 'motor' else 'x'}",
         enters="motion",
@@ -297,7 +305,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
                 default=0.5,
                 limits=(POSITIVE, _BELOW_WHOLE),
             ),
-            _motor_damping("COUPLING_DAMPING_SHARE"),
+            *braked,
             Parameter(
                 "damping_ratio",
                 lambda scales: (0.05,),
@@ -310,7 +318,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
         ),
         derived={"SENSOR_AT_MOTOR": lambda value: float(sensor == "motor")},
         resonant=_gives_way_at,
-        stated=_ELASTIC_STATED,
+        stated=(*_ELASTIC_STATED, *stated),
         words={"sensor": sensor},
         confused_with=looks_like,
         # A motor without an inertia of its own is a lag.
