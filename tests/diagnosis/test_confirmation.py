@@ -37,7 +37,8 @@ def test_what_was_found_is_a_fact_where_its_own_run_bears_it_out(
         before=[], force=[], where=(), found=None,
         verdict=DiagnosisVerdict("named", True, made_up(pair, 100.0), ()),
     )  # fmt: skip
-    turn = SimpleNamespace(values_of_run={})
+    drive = SimpleNamespace(drive=None)
+    turn = SimpleNamespace(values_of_run={}, problem=drive)
     monkeypatch.setattr(confirmation, "settled", lambda *_: turn)
     monkeypatch.setattr(confirmation, "is_as_good", lambda _: True)
     monkeypatch.setattr(confirmation, "_without_idle", lambda _, best, __: best)

@@ -869,7 +869,11 @@ def test_forces_in_the_place_of_parameters_are_told(
         (),
         RunStarts({"step": 1.5}),
     )
-    told = foreign._told(None, begun, (GIVEN, GIVEN))
+    findings = SimpleNamespace(
+        problem=SimpleNamespace(drive=None),
+        verdict=SimpleNamespace(chosen=SimpleNamespace(effects=())),
+    )
+    told = foreign._told(findings, begun, (GIVEN, GIVEN))
     assert "start 1.5 to 1.5 mm from where the simulation does" in told.warnings[-1]
     texts = [one for one in told.warnings if "simulation.stand_in" in one]
     assert len(texts) == n_said
@@ -963,3 +967,21 @@ def replaced_findings(word, fits):
         DiagnosisVerdict(word, is_complete=False, chosen=None, rivals=()),
         Some(fits=fits),
     )
+
+
+@pytest.mark.parametrize(
+    ("lag_s", "effects", "is_said"),
+    [
+        (0.03, ("coulomb_friction",), True),
+        (0.0, ("coulomb_friction",), False),
+        # What changes the input acts before the lag.
+        (0.03, ("input_dead_zone", "coulomb_friction"), False),
+        (0.03, (), False),
+    ],
+)
+def test_a_lag_that_effects_act_behind_is_said(lag_s, effects, is_said):
+    findings = SimpleNamespace(
+        problem=SimpleNamespace(drive=StandIn(lag_s=lag_s)),
+        verdict=SimpleNamespace(chosen=SimpleNamespace(effects=effects)),
+    )
+    assert ("a lag of 0.03 s" in foreign._lag_sentence(findings)) == is_said

@@ -52,13 +52,13 @@ def gear_start(of, **changes):
 
 @pytest.fixture(scope="module")
 def stuck(rattling):
-    start = gear_start(rattling, half_gap_m=6e-4, stiffness_N_per_m=6e4)
+    start = gear_start(rattling, half_gap_m=8e-4, stiffness_N_per_m=6e4)
     return fit_candidate(rattling, GEAR, [start], sizes(rattling), white(NOISE))
 
 
 @pytest.fixture(scope="module")
 def grown(rattling, stuck):
-    start = gear_start(rattling, half_gap_m=6e-4, stiffness_N_per_m=6e4)
+    start = gear_start(rattling, half_gap_m=8e-4, stiffness_N_per_m=6e4)
     begun = grown_starts(start, GEAR, sizes(rattling))
     return fit_grown(rattling, stuck, begun, sizes(rattling), white(NOISE))
 

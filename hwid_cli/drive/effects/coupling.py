@@ -4,6 +4,7 @@ docs/method_diagnosis.md, eq. (D11) to (D13).
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import log, pi
 
 from hwid_cli.drive.effect import (
@@ -268,24 +269,15 @@ _ELASTIC_STATED = (
     Stated("motor_share", (POSITIVE, _BELOW_WHOLE), is_needed=False),
     Stated("damping_ratio", (NOT_NEGATIVE,), is_needed=False),
 )
-_BRAKED_STATED = Stated(
-    "motor_damping_share", (NOT_NEGATIVE, _BELOW_WHOLE), is_needed=False
-)
 
 
 def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
-    """One entry of the elastic coupling, by the place of the sensor.
-
-    At the load it does not tell which part of the damping brakes the motor.
-    """
-    braked = (_motor_damping("COUPLING_DAMPING_SHARE"),) if sensor == "motor" else ()
-    stated = (_BRAKED_STATED,) if sensor == "motor" else ()
-    at_motor, at_load = (" - s c xm'", "(1 - s) ") if braked else ("", "")
+    """One entry of the elastic coupling, by the place of the sensor."""
     return Effect(
         id=f"elastic_coupling:{sensor}",
         sentence="a shaft or belt that gives way between motor and load; "
         f"the sensor is at the {sensor}",
-        equation=f"m1 xm'' = kt i - T{at_motor}, m2 x'' = T - {at_load}c x' - k x; "
+        equation="m1 xm'' = kt i - T, m2 x'' = T - c x' - k x; "
         "T = kc (xm - x) + cc (xm' - x'), "
         f"y = {'xm' if sensor == 'motor' else 'x'}",
         enters="motion",
@@ -305,7 +297,6 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
                 default=0.5,
                 limits=(POSITIVE, _BELOW_WHOLE),
             ),
-            *braked,
             Parameter(
                 "damping_ratio",
                 lambda scales: (0.05,),
@@ -318,7 +309,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
         ),
         derived={"SENSOR_AT_MOTOR": lambda value: float(sensor == "motor")},
         resonant=_gives_way_at,
-        stated=(*_ELASTIC_STATED, *stated),
+        stated=_ELASTIC_STATED,
         words={"sensor": sensor},
         confused_with=looks_like,
         # A motor without an inertia of its own is a lag.
@@ -327,12 +318,31 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
     )
 
 
-ELASTIC_MOTOR = _elastic(
-    "motor",
-    {
-        "second_mode": "slow motion against the spring, which then pulls at the load",
-        "gear_backlash": "large and small reversals",
-    },
+def _braked(effect: Effect) -> Effect:
+    """The same where a part of the damping brakes the motor.
+
+    A sensor at the load does not tell which part.
+    """
+    stated = Stated(
+        "motor_damping_share", (NOT_NEGATIVE, _BELOW_WHOLE), is_needed=False
+    )
+    return replace(
+        effect,
+        equation="m1 xm'' = kt i - T - s c xm', m2 x'' = T - (1 - s) c x' - k x; "
+        "T = kc (xm - x) + cc (xm' - x'), y = xm",
+        parameters=(*effect.parameters, _motor_damping("COUPLING_DAMPING_SHARE")),
+        stated=(*effect.stated, stated),
+    )
+
+
+ELASTIC_MOTOR = _braked(
+    _elastic(
+        "motor",
+        {
+            "second_mode": "slow motion against the spring, which then pulls at the load",
+            "gear_backlash": "large and small reversals",
+        },
+    )
 )
 ELASTIC_LOAD = _elastic(
     "load",
