@@ -20,6 +20,7 @@ from hwid_cli.drive.simulation import NO_FORCE
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.axis import MotionUnits
 from hwid_cli.records.diagnosis import BaseParameter
+from hwid_cli.records.drive import StandIn
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.programs import (
     Capabilities,
