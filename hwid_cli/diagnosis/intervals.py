@@ -121,7 +121,7 @@ def soft_stops(problem: DiagnosisProblem, found: CandidateFit) -> tuple[str, ...
         one
         for one in bent
         if public_id(one) in _STOPS
-        and not values.get(ParameterRef(one, "exponent"), 1.0) > 1.0
+        and values.get(ParameterRef(one, "exponent"), 1.0) <= 1.0
         and values[ParameterRef(one, "stiffness_N_per_m")] < _SOFT * spring
     )
 

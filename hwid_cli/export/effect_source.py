@@ -54,9 +54,9 @@ def effect_source(
     lag = lag_before(plain, tuple(drive_effects(stand_in)))
     if lag and not at_force:
         raise ConfigError(
-            "--format c: simulation.force_input: missing, and forces act behind a lag of "
-            f"{lag:.3g} s that the simulation's input passes; expected an input "
-            "for forces; give the simulation one, or use --format python"
+            "simulation.force_input: missing, and forces act behind a lag of "
+            f"{lag:.3g} s that the simulation's input passes; expected an input for "
+            "forces, step by step; give the simulation one, or use --format python"
         )
     acts_as = (
         "the force [N] that acts in that step"

@@ -14,7 +14,7 @@ from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.errors import ConfigError
 from hwid_cli.export.effects_alone import write_effects
 from hwid_cli.export.modelica import LAWS, modelica_text
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import Drive, StandIn
 from hwid_cli.records.experiment import Columns
 from hwid_cli.records.exported import ModelCard
 from hwid_cli.records.own_effects import OwnEffect, OwnParameter, own_id
@@ -161,6 +161,25 @@ def test_modelica_text_moves_a_mass_as_the_effect_does(name):
 
 def test_every_law_is_tried():
     assert set(LAWS) <= set(VALUES)
+
+
+@pytest.mark.parametrize("file_format", ["c", "simulink"])
+def test_forces_behind_a_lag_need_an_input_of_their_own(file_format, tmp_path):
+    """Step by step nothing can be sent ahead; what acts before the lag needs not be."""
+    plain = StandIn(0.3, 15.0, 1184.0, 5.0, lag_s=0.03)
+    friction = {"coulomb_friction": VALUES["coulomb_friction"]}
+
+    def write(force_input, effects):
+        base = PythonSimulation(
+            file="a.py", input="i", output="x", force_input=force_input
+        )
+        extended = ExtendedSimulation(base, plain, replace(plain, effects=effects))
+        return write_effects(tmp_path, file_format, extended, CARD, STEP_S)
+
+    with pytest.raises(ConfigError, match=r"force_input: missing, .* lag of 0\.03 s"):
+        write(None, friction)
+    assert write("f", friction)
+    assert write(None, {"input_dead_zone": VALUES["input_dead_zone"]})
 
 
 def test_what_is_no_plain_equation_is_one_line():

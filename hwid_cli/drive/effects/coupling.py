@@ -130,18 +130,19 @@ def _shares(least: float) -> Callable[[Scales], tuple[float, float]]:
 
 # The load has the rest.
 _BELOW_WHOLE = Limit("a share below 1", lambda value: value < 1)
+_OF_MOTOR, _OF_MOTOR_LIMITS = "motor_damping_share", (NOT_NEGATIVE, _BELOW_WHOLE)
 
 
 def _motor_damping(place: str) -> Parameter:
     """Share of the damping that brakes the motor, as its own bearing does."""
     return Parameter(
-        "motor_damping_share",
+        _OF_MOTOR,
         lambda scales: (0.1,),
         lambda scales: (0.0, 0.95),
         is_positive=False,
         places=(place,),
         default=0.0,
-        limits=(NOT_NEGATIVE, _BELOW_WHOLE),
+        limits=_OF_MOTOR_LIMITS,
     )
 
 
@@ -323,9 +324,7 @@ def _braked(effect: Effect) -> Effect:
 
     A sensor at the load does not tell which part.
     """
-    stated = Stated(
-        "motor_damping_share", (NOT_NEGATIVE, _BELOW_WHOLE), is_needed=False
-    )
+    stated = Stated(_OF_MOTOR, _OF_MOTOR_LIMITS, is_needed=False)
     return replace(
         effect,
         equation="m1 xm'' = kt i - T - s c xm', m2 x'' = T - (1 - s) c x' - k x; "
