@@ -6,22 +6,26 @@ the simulation are told from them. docs/method_diagnosis.md, eq. (D30) to (D30d)
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy
 
 from hwid_cli.diagnosis.candidate import base_of
-from hwid_cli.diagnosis.input_lag import behind_lag
+from hwid_cli.diagnosis.force_balance import (
+    LEAST_MASS,
+    balance_along,
+    column_lengths,
+    is_moving,
+    output_of,
+)
+from hwid_cli.diagnosis.input_lag import inputs_behind, lag_of_input
 from hwid_cli.diagnosis.parameters import drive_at, first_point, parameter_layout
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.scales import scales_of_recordings
 from hwid_cli.diagnosis.search import fit_point
 from hwid_cli.diagnosis.stand_in import (
-    STILL,
-    Moved,
-    along_motion,
     force_along,
     in_newtons,
     moved_as,
@@ -29,12 +33,9 @@ from hwid_cli.diagnosis.stand_in import (
     seen_start,
 )
 from hwid_cli.drive.springs import spring_force
-from hwid_cli.records.drive import HELD, LINE, StandIn
+from hwid_cli.records.drive import LINE, StandIn
 from hwid_cli.records.programs import SimulatorRun
 
-# A spring or a damper that gives less of the force than this share is none.
-_LEAST_SHARE = 1e-4
-_LEAST_MASS = 1e-12
 # Nothing in a stand-in runs faster than this many times in a sample: samples do not show
 # it, and each of its curved forces is followed in steps of that size, [-].
 _FASTEST = 10.0
@@ -56,11 +57,6 @@ _PUSHES_BACK = 1.2
 # Friction is in a simulation where it leaves at most this share of what other drives do.
 _DRY = 0.2
 _ITERATIONS = 20
-# A lag of the input is one where what drives without it leave is at least this much, and
-# the best lag leaves at most this share of it; so many are looked at, from this share of a
-# sample to this one of a recording.
-_LEAST_BEFORE_LAG, _BEHIND_LAG = 0.01, 0.2
-_N_LAGS, _SHORTEST_LAG, _LONGEST_LAG = 16, 0.3, 0.1
 
 
 def fit_stand_in(
@@ -92,61 +88,13 @@ def fit_stand_in(
     ----------
     docs/method_diagnosis.md, eq. (D30) and (D30e).
     """
-    lag = _lag_of_input(signals, runs, hold) if may_lag else 0.0
+    lag = lag_of_input(signals, runs, hold) if may_lag else 0.0
     if not lag:
         return _fitted(signals, runs, may_curve=may_curve, hold=hold)
-    behind = _behind(signals, lag, hold)
+    behind = inputs_behind(signals, lag, hold)
     # What has passed a lag makes no jumps, whatever its input does.
     drive = _fitted(behind, runs, may_curve=may_curve, hold=LINE)
     return replace(drive, hold=hold, lag_s=lag)
-
-
-def _behind(signals: Sequence[Signals], lag_s: float, hold: str) -> list[Signals]:
-    """Recordings whose inputs have passed a lag."""
-    is_held = hold == HELD
-    return [
-        replace(
-            one,
-            driven_by=behind_lag(
-                one.driven_by, lag_s, one.sample_time_s, is_held=is_held
-            ),
-        )
-        for one in signals
-    ]
-
-
-def _lag_of_input(
-    signals: Sequence[Signals], runs: Sequence[SimulatorRun], hold: str
-) -> float:
-    """Time constant of a lag without which no drive moves as the simulation, [s]; or 0."""
-    kinds: tuple[dict[str, bool], ...] = ({}, {"is_curved": True}, {"is_dry": True})
-    before = min(_by_regression(signals, runs, hold, **one).left for one in kinds)
-    if before < _LEAST_BEFORE_LAG:
-        return 0.0
-    step = signals[0].sample_time_s
-    longest = _LONGEST_LAG * step * min(one.driven_by.size for one in signals)
-    rows, sizes, _ = _columns(signals, runs, is_curved=True)
-    # Only the input changes with the lag: the columns are worked off once.
-    basis, among = np.linalg.qr(rows / _lengths(rows))
-
-    def left(log_lag: float) -> float:
-        behind = _behind(signals, float(np.exp(log_lag)), hold)
-        pairs = zip(behind, sizes, strict=True)
-        right = np.concatenate([one.driven_by / size for one, size in pairs])
-        along = basis.T @ right
-        beside = max(float(right @ right - along @ along), 0.0)
-        inner = scipy.optimize.nnls(among, along)[1]
-        return float(np.sqrt((beside + inner**2) / (right @ right)))
-
-    logs = np.log(np.geomspace(_SHORTEST_LAG * step, longest, _N_LAGS))
-    lefts = [left(one) for one in logs]
-    at = int(np.argmin(lefts))
-    if at in (0, _N_LAGS - 1) or lefts[at] > before:
-        return 0.0
-    best = scipy.optimize.minimize_scalar(
-        left, bounds=(logs[at - 1], logs[at + 1]), method="bounded"
-    )
-    return float(np.exp(best.x)) if best.fun <= _BEHIND_LAG * before else 0.0
 
 
 def _fitted(
@@ -157,14 +105,14 @@ def _fitted(
     hold: str,
 ) -> StandIn:
     """The drive of an input that has passed no lag, or of what has passed it."""
-    straight = _by_regression(signals, runs, hold)
-    curved = _by_regression(signals, runs, hold, is_curved=True)
+    straight = balance_along(signals, runs, hold)
+    curved = balance_along(signals, runs, hold, is_curved=True)
     ways = [moved_as(one, run).position for one, run in zip(signals, runs, strict=True)]
     widest = _PUSHES_BACK * max(float(np.max(np.abs(one))) for one in ways)
     is_nearer = straight.left > _STRAIGHT and curved.left <= _CURVED * straight.left
     is_curved = may_curve and is_nearer and _pushes_back(curved.drive, widest)
     best = curved if is_curved else straight
-    dry = _by_regression(signals, runs, hold, is_dry=True)
+    dry = balance_along(signals, runs, hold, is_dry=True)
     if dry.left <= _DRY * best.left and best.left > _STRAIGHT:
         # Friction in the simulation goes with the forces along its motion; in a free run
         # without it a damper would stand for it.
@@ -244,15 +192,15 @@ def fit_beside_integral(
     matrix = np.column_stack([
         moved.acceleration, moved.velocity, moved.position, sum_s
     ])  # fmt: skip
-    lengths = _lengths(matrix)
+    lengths = column_lengths(matrix)
     values, left = scipy.optimize.nnls(matrix / lengths, push)
     mass, damping, stiffness, _ = values / lengths
     drive = StandIn(
-        max(float(mass), _LEAST_MASS),
+        max(float(mass), LEAST_MASS),
         float(damping),
         float(stiffness),
         1.0,
-        output=_output_of(signals),
+        output=output_of(signals),
     )
     drive = _no_faster_than_seen(drive, [signals])
     return drive, float(left**2 / max(float(push @ push), 1e-300))
@@ -278,12 +226,12 @@ def gain_beside_friction(
         Its standard error as a share of it.
     """
     moved = moved_as(signals, there)
-    used = _moves(moved)
+    used = is_moving(moved)
     columns = np.column_stack([
         -push, moved.acceleration, moved.velocity, moved.position,
         np.ones(push.size), np.sign(moved.velocity),
     ])[used]  # fmt: skip
-    lengths = _lengths(columns)
+    lengths = column_lengths(columns)
     inverse = np.linalg.pinv(columns / lengths)
     driven_by = signals.driven_by[used]
     values = inverse @ driven_by
@@ -292,19 +240,6 @@ def gain_beside_friction(
     error = deviation * float(np.sqrt(inverse[0] @ inverse[0]))
     gain = float(values[0])
     return gain / float(lengths[0]), error / abs(gain) if gain else np.inf
-
-
-def _moves(moved: Moved) -> np.ndarray:
-    """Samples in which friction has the direction of the motion; at rest it has any."""
-    speed = np.abs(moved.velocity)
-    return np.asarray(speed > STILL * np.max(speed))
-
-
-def _lengths(columns: np.ndarray) -> np.ndarray:
-    """Length of each column, 1 for one of zeros."""
-    lengths = np.sqrt(np.sum(columns**2, axis=0))
-    lengths[lengths == 0] = 1.0
-    return np.asarray(lengths)
 
 
 def _answer_to_push(runs: tuple[SimulatorRun, SimulatorRun]) -> SimulatorRun:
@@ -338,124 +273,6 @@ def with_input_of(
             constants.append(float(driven_by @ (force - np.mean(force))) / size)
     usual = float(np.median(constants)) if constants else 0.0
     return replace(drive, force_constant_N_per_A=usual) if usual > 0 else None
-
-
-@dataclass(frozen=True, eq=False)
-class _Balance:
-    """A drive that balances the input along the motion of a simulation.
-
-    Parameters
-    ----------
-    left : float, [-]
-        Share of the input that is not balanced.
-    constant : float, [input unit]
-        What of the input is not needed, all along.
-    """
-
-    drive: StandIn
-    left: float
-    constant: float
-
-
-def _by_regression(
-    signals: Sequence[Signals],
-    runs: Sequence[SimulatorRun],
-    hold: str,
-    *,
-    is_curved: bool = False,
-    is_dry: bool = False,
-) -> _Balance:
-    """Mass, damping and spring that balance the input along the motion.
-
-    Parameters
-    ----------
-    hold : str
-        How the input goes on between samples.
-    is_dry : bool
-        Beside a friction that goes with the direction alone, where something moves; it
-        is no part of the drive.
-    """
-    kind = StandIn(1.0, 0.0, 0.0, 1.0, hold=hold)
-    rows, sizes, used = _columns(signals, runs, is_curved=is_curved, is_dry=is_dry)
-    right = np.concatenate([
-        along_motion(kind, one.driven_by)[counts] / size
-        for one, size, counts in zip(signals, sizes, used, strict=True)
-    ])  # fmt: skip
-    best = _balanced(rows, right, is_curved=is_curved)
-    output = _output_of(signals[0])
-    return replace(best, drive=replace(best.drive, output=output, hold=hold))
-
-
-def _columns(
-    signals: Sequence[Signals],
-    runs: Sequence[SimulatorRun],
-    *,
-    is_curved: bool = False,
-    is_dry: bool = False,
-) -> tuple[np.ndarray, list[float], list[np.ndarray]]:
-    """What may balance an input along the motion of a simulation.
-
-    Returns
-    -------
-    ndarray, shape (n_used, n_columns)
-        Acceleration, velocity, position, pairs of what may have either sign, and what a
-        friction does, each recording over the size of its input.
-    list of float, [input unit]
-        These sizes.
-    list of ndarray of bool, shape (n_samples,)
-        Which samples are used.
-    """
-    rows, sizes, used = [], [], []
-    for one, found in zip(signals, runs, strict=True):
-        moved = moved_as(one, found)
-        sizes.append(float(np.std(one.driven_by)) or 1.0)
-        # What may have either sign is two columns that are not negative.
-        signed = [np.ones(one.driven_by.size)]
-        if is_curved:
-            signed += [moved.position**2, moved.position**3]
-        columns = [moved.acceleration, moved.velocity, moved.position]
-        columns += [sign * column for column in signed for sign in (1.0, -1.0)]
-        used.append(np.ones(one.driven_by.size, dtype=bool))
-        if is_dry:
-            columns.append(np.sign(moved.velocity))
-            used[-1] = _moves(moved)
-        rows.append(np.column_stack(columns)[used[-1]] / sizes[-1])
-    return np.concatenate(rows), sizes, used
-
-
-def _output_of(signals: Signals) -> str:
-    """What is compared; one of ``records.drive.OUTPUTS``."""
-    return "velocity" if signals.is_velocity else "position"
-
-
-def _balanced(matrix: np.ndarray, vector: np.ndarray, *, is_curved: bool) -> _Balance:
-    """Least squares of forces, none of which is negative.
-
-    Parameters
-    ----------
-    matrix : ndarray, shape (n_samples, n_columns)
-        Acceleration, velocity, position, pairs of what may have either sign, and more.
-    vector : ndarray, shape (n_samples,)
-        The input.
-    """
-    lengths = _lengths(matrix)
-    found_values, left = scipy.optimize.nnls(matrix / lengths, vector)
-    values = found_values / lengths
-    whole = float(np.sqrt(np.sum(vector**2))) or 1.0
-    shares = values * lengths / whole
-    mass, damping, stiffness = values[:3]
-    if shares[0] < _LEAST_SHARE:
-        # Hardly any inertia: as much as a sampled motion can show.
-        mass = max(_LEAST_SHARE * whole / lengths[0], _LEAST_MASS)
-    drive = StandIn(
-        mass_kg=float(mass),
-        damping_N_s_per_m=float(damping if shares[1] > _LEAST_SHARE else 0.0),
-        stiffness_N_per_m=float(stiffness if shares[2] > _LEAST_SHARE else 0.0),
-        force_constant_N_per_A=1.0,
-        quadratic_N_per_m2=float(values[5] - values[6]) if is_curved else 0.0,
-        cubic_N_per_m3=float(values[7] - values[8]) if is_curved else 0.0,
-    )
-    return _Balance(drive, float(left) / whole, float(values[3] - values[4]))
 
 
 def _pushes_back(drive: StandIn, widest: float) -> bool:
