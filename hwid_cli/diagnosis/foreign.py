@@ -27,7 +27,12 @@ from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence, with_st
 from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator, most_runs
 from hwid_cli.diagnosis.single_effects import ToldByRuns, single_in_simulation
-from hwid_cli.diagnosis.stand_in import act_as_forces, change_between, lag_before
+from hwid_cli.diagnosis.stand_in import (
+    act_as_forces,
+    acts_at_port,
+    change_between,
+    lag_before,
+)
 from hwid_cli.diagnosis.standing import its_own, standing_beside
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks
 from hwid_cli.diagnosis.turns import have_moved, where_it_starts
@@ -266,7 +271,8 @@ def _found(
             return alone.findings, alone.values, True
         told = alone.findings
         least = _MOVED if told is None else _MOVED_BESIDE_NAMED
-        if is_first and have_moved(values, alone.values, least):
+        begins_anew = is_first and have_moved(values, alone.values, least)
+        if begins_anew and not _is_exact(told):
             # What runs bear out stays unless a search from there leaves less.
             return told or found, alone.values, told is not None
         # Nothing more to look for: no gap, or parameters.
@@ -274,6 +280,8 @@ def _found(
             return confirm(found, runs, values)
         alone = with_further_effect(alone, runs, options, on_round)
         is_told = alone.findings is not None
+        if begins_anew and not (is_told and _is_enough(alone)):
+            return told or found, alone.values, is_told
         if options.max_runs is None:
             runs = runs.up_to(_FOR_SETS)
         if runs.run_tasks.are_spent or (is_told and _is_enough(alone)):
@@ -282,6 +290,15 @@ def _found(
     else:
         standing = _with_nearer_spring(standing, singles, runs, on_round)
     return _of_sets(standing, options, (runs, values), on_round, given_sse, alone)
+
+
+def _is_exact(told: Findings | None) -> bool:
+    """Whether what is told was fitted through runs alone, whatever the stand-in says.
+
+    Effects at the ports are, from the parameters as stated, too: a search from where these
+    have moved to would tell no more of them.
+    """
+    return told is not None and acts_at_port(told.verdict.chosen.effects)
 
 
 def _is_enough(alone: ToldByRuns) -> bool:

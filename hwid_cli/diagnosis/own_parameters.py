@@ -24,6 +24,9 @@ _BY_CHANCE, _MOST_BY_CHANCE = 2.0, 0.5
 # Beside a rival, where the values found are the answer, it goes on while they leave less
 # than this share, [-]; the first one has so many evaluations.
 _HARDLY_FALLS = 0.999
+# A search ends where a step takes less than this share away; sooner beside a rival where far
+# more than the noise is left: the last digits of a wrong answer are worth no run, [-].
+_FINE, _COARSE = 1e-6, 0.01
 _FIRST_EVALUATIONS = 4
 _LAST_FEW, _STILL_FALLS = 3, 0.8
 # Recordings that they are fitted to.
@@ -52,7 +55,7 @@ def fit_parameters(
         Of the recordings; near it a search goes on for less.
     """
     chosen = _chosen(signals)
-    near = sum(one.n_evaluated for one in chosen) * (STILL_LARGE * noise_rms) ** 2
+    near = _near(chosen, noise_rms)
     return _fitted(ask, chosen, free, values, np.inf, near) or values
 
 
@@ -62,6 +65,7 @@ def fit_beside(
     free: Mapping[str, FreeParameter],
     values: dict[str, float],
     rival: Mapping[str, float],
+    noise_rms: float = 0.0,
 ) -> dict[str, float] | None:
     """The same, given up where a few evaluations leave more than something else does.
 
@@ -72,7 +76,12 @@ def fit_beside(
     """
     chosen = _chosen(signals)
     most = sum(rival[one.name] for one in chosen)
-    return _fitted(ask, chosen, free, values, most)
+    return _fitted(ask, chosen, free, values, most, _near(chosen, noise_rms))
+
+
+def _near(signals: Sequence[Signals], noise_rms: float) -> float:
+    """Squares that are near those of the noise, [output unit squared]."""
+    return sum(one.n_evaluated for one in signals) * (STILL_LARGE * noise_rms) ** 2
 
 
 def _chosen(signals: Sequence[Signals]) -> list[Signals]:
@@ -88,7 +97,7 @@ def _fitted(
     free: Mapping[str, FreeParameter],
     values: dict[str, float],
     most: float,
-    near: float = 0.0,
+    near: float,
 ) -> dict[str, float] | None:
     """Fitted parameters; None where runs fail or leave more than so much, [output unit^2].
 
@@ -102,19 +111,21 @@ def _fitted(
     if not np.isfinite(gap.errors(start)).all():
         return None
     searches, falls = [_MOST_EVALUATIONS] * _MOST_SEARCHES, _STILL_FALLS
-    if np.isfinite(most):
+    is_beside = bool(np.isfinite(most))
+    if is_beside:
         searches.insert(0, _FIRST_EVALUATIONS)
         falls = _HARDLY_FALLS
     before = np.inf
     for evaluations in searches:
+        is_coarse = is_beside and gap.least > near
         found = scipy.optimize.least_squares(
             gap.errors, start, gap.slopes, (gap.low, gap.high), x_scale=1.0,
-            max_nfev=evaluations, ftol=1e-6, xtol=1e-5,
+            max_nfev=evaluations, ftol=_COARSE if is_coarse else _FINE, xtol=1e-5,
         )  # fmt: skip
         start = found.x
         if 2.0 * found.cost > most:
             return None
-        if found.status > 0:
+        if found.status > 0 and (gap.least > near or not is_coarse):
             break
         is_first = evaluations == _FIRST_EVALUATIONS
         has_come = found.cost < (1.0 - _STILL_PROMISED) * before
@@ -207,6 +218,11 @@ class _Gap:
     def coordinates(self, values: Mapping[str, float]) -> np.ndarray:
         """Free parameters over their sizes, shape (n_free,), [-]."""
         return np.array([values[name] / size for name, size in self._sizes.items()])
+
+    @property
+    def least(self) -> float:
+        """Squares of the best place so far, [output unit squared]."""
+        return min(self._costs)
 
     def falls_by(self, share: float) -> bool:
         """Whether the last few evaluations have left less than a share of those before."""

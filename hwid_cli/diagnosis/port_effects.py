@@ -134,7 +134,8 @@ def begin_at_port(
         return None
     few = moving_most(findings.problem.signals)
     without = _by_name(findings, gap_without(findings))
-    found = fit_beside(search.ask, few, search.free, best, without)
+    rms = findings.criteria.noise.rms
+    found = fit_beside(search.ask, few, search.free, best, without, rms)
     if found is None:
         return None
     noise = _by_name(findings, findings.criteria.floors)
@@ -158,7 +159,8 @@ def with_port_effects(findings: Findings, start: PortStart, runs: Runs) -> Turn 
     search = PortSearch(findings, without_base(start.fit), runs)
     signals = findings.problem.signals
     without = _by_name(findings, gap_without(findings))
-    found = fit_beside(search.ask, signals, search.free, start.values, without)
+    rms = findings.criteria.noise.rms
+    found = fit_beside(search.ask, signals, search.free, start.values, without, rms)
     begun = None if found is None else search.begun(found)
     turn = None if begun is None else best_turn(findings, begun, runs)
     if turn is None or turn.tried is None:

@@ -17,6 +17,7 @@ from hwid_cli.diagnosis.own_base import is_beyond_factors, judged_by_own_base
 from hwid_cli.diagnosis.port_effects import (
     PortStart,
     begin_at_port,
+    moving_most,
     port_effects,
     with_port_effects,
 )
@@ -62,6 +63,9 @@ _NEARLY = 3.0
 # Mean square over the noise's beside which no further one is begun, unless runs have called
 # it likely by nearly the same share.
 _NEXT_TO_NOISE, _ALIKE = 2.0, 2.0
+# Squares over those that another effect's run leaves of the same recordings, from which on an
+# effect at a port is not fitted to the others.
+_FAR_BEHIND = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +120,9 @@ def single_in_simulation(
     likely = _likely(findings)
     criteria, base = findings.criteria, findings.base
     if not any(criteria.is_nearly_all(one, base) for one in likely):
-        found = _at_ports_by_runs_alone(tried, runs, values, may_pair=may_pair)
-        tried.keep(found)
+        _at_ports_by_runs_alone(tried, runs, values, may_pair=may_pair)
     _try_likely(tried, likely, runs, values, on_round)
-    tried.keep(_at_ports_later(tried, runs))
+    _at_ports_later(tried, runs)
     _follow(tried, runs, at_most=MOST_LEFT)
     tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
     decided = decided_by_runs(findings, tried.turns, tried.fits)
@@ -138,16 +141,26 @@ class _Tried:
         self.findings = findings
         self.turns: dict[tuple[str, ...], Turn] = {}
         self.fits: dict[tuple[str, ...], CandidateFit] = {}
-        # Effects at the ports that were fitted through runs, what was asked before, and
-        # which of them wait.
+        # Effects at the ports that were fitted through runs, those begun that are hopeless,
+        # what was asked before, and which of them wait.
         self.through_runs: set[tuple[str, ...]] = set()
+        self.given_up: set[tuple[str, ...]] = set()
         self.at_ports = AtPorts()
         self.later: list[PortStart] = []
+        # Mean square over the noise's that the best of those begun leaves.
+        self.least_begun = np.inf
         # Whose runs were followed to their end.
         self.followed: set[tuple[str, ...]] = set()
 
-    def is_told_by_ports(self, one: CandidateFit) -> bool:
-        """Whether runs leave nothing with another effect at a port, and much with this one."""
+    def is_known(self, one: CandidateFit) -> bool:
+        """Whether runs have said what an effect leaves, whatever a stand-in says.
+
+        It was fitted through runs or given up; or they leave nothing with another effect at
+        a port, and much with this one.
+        """
+        is_exact = one.effects in self.through_runs and one.effects in self.fits
+        if is_exact or one.effects in self.given_up:
+            return True
         criteria, (effect,) = self.findings.criteria, one.effects
         return any(
             criteria.is_complete(fit) and self.at_ports.is_behind(effect, *fit.effects)
@@ -155,16 +168,30 @@ class _Tried:
             if len(fit.effects) == 1
         )
 
-    def are_nearly_all(self, turns: Sequence[Turn]) -> bool:
-        """Whether one of some runs leaves nothing that could be named."""
+    def are_nearly_all(self, turns: Sequence[Turn] | None = None) -> bool:
+        """Whether one of some runs, or of all, leaves nothing that could be named."""
         criteria, base = self.findings.criteria, self.findings.base
-        fits = [fit_of_run(self.findings, turn) for turn in turns]
+        fits = list(self.fits.values())
+        if turns is not None:
+            fits = [fit_of_run(self.findings, turn) for turn in turns]
         return any(criteria.is_nearly_all(fit, base) for fit in fits)
 
-    def is_far_from_all(self, start: PortStart) -> bool:
-        """Whether a start leaves much, and another effect leaves nothing."""
-        far = start.left > STILL_LARGE**2
-        return far and self.are_nearly_all(list(self.turns.values()))
+    def is_hopeless(self, start: PortStart) -> bool:
+        """Whether a start leaves much, and another effect nothing or far less."""
+        if start.left <= STILL_LARGE**2:
+            return False
+        if self.are_nearly_all():
+            return True
+        of_runs = map(self._left_of_few, self.fits.values())
+        return start.left > _FAR_BEHIND * min([self.least_begun, *of_runs])
+
+    def _left_of_few(self, fit: CandidateFit) -> float:
+        """Mean square over the noise's of the recordings that starts are fitted to."""
+        problem, floors = self.findings.problem, self.findings.criteria.floors
+        few = {one.name for one in moving_most(problem.signals)}
+        rows = [n for n, one in enumerate(problem.signals) if one.name in few]
+        floor = float(floors[rows].sum())
+        return float(fit.sse[rows].sum()) / floor if floor > 0 else np.inf
 
     def keep(self, turns: Sequence[Turn]) -> None:
         """Keep runs that leave less than those before with the same effect."""
@@ -188,7 +215,7 @@ def _try_likely(
         fits = list(tried.fits.values())
         if runs.run_tasks.are_spent and (fits or place > 1):
             break
-        if tried.is_told_by_ports(one) or _is_settled_by(findings, one, fits):
+        if tried.is_known(one) or _is_settled_by(findings, one, fits):
             continue
         (effect,) = one.effects
         what = f"single effects in the simulation, {place} of {len(likely)}"
@@ -208,7 +235,9 @@ def _in_simulation(
         tried.through_runs.add(one.effects)
         waiting = (each for each in tried.later if each.fit.effects == one.effects)
         start = next(waiting, None) or begin_at_port(findings, one, runs, values)
-        if start is not None and not tried.is_far_from_all(start):
+        if start is not None and tried.is_hopeless(start):
+            return []
+        if start is not None:
             found = _through_runs(tried, start, runs)
         if tried.are_nearly_all(found) or runs.run_tasks.are_spent:
             return found
@@ -275,30 +304,34 @@ def _twins_in_simulation(
 
 def _at_ports_by_runs_alone(
     tried: _Tried, runs: Runs, values: dict[str, float], *, may_pair: bool
-) -> list[Turn]:
+) -> None:
     """Effects at the ports that the simulation calls likely, whatever its stand-in says.
 
     Those that leave much of a few recordings wait until others have been tried.
     """
-    found: list[Turn] = []
     if runs.run_tasks.are_spent:
-        return found
+        return
     tried.at_ports = screened_at_ports(tried.findings, runs, values)
     said = _least_said(tried.findings)
-    for start in _begun_at_ports(tried, tried.at_ports, runs):
-        if tried.are_nearly_all(found) or runs.run_tasks.are_spent:
+    starts = _begun_at_ports(tried, tried.at_ports, runs)
+    tried.least_begun = min((one.left for one in starts), default=np.inf)
+    for start in starts:
+        if tried.are_nearly_all() or runs.run_tasks.are_spent:
             break
+        if tried.is_hopeless(start):
+            tried.given_up.add(start.fit.effects)
+            continue
         is_large = start.left > STILL_LARGE**2
         waits = is_large and start.left > _WORTH_WAITING * said
         if is_large and not waits and may_pair:
-            found += _pair_at_ports(tried, start, runs)
-            if tried.are_nearly_all(found):
+            tried.keep(_pair_at_ports(tried, start, runs))
+            if tried.are_nearly_all():
                 break
         if waits and start.share > _MOST_OF_GAP:
             tried.later.append(start)
-            continue
-        found += _through_runs(tried, start, runs)
-    return [*found, *_with_wider_law(tried, found, runs)]
+        else:
+            tried.keep(_through_runs(tried, start, runs))
+    tried.keep(_with_wider_law(tried, runs))
 
 
 def _begun_at_ports(tried: _Tried, at_ports: AtPorts, runs: Runs) -> list[PortStart]:
@@ -358,28 +391,26 @@ def _second_alone(
     return _through_runs(tried, alone, runs)
 
 
-def _at_ports_later(tried: _Tried, runs: Runs) -> list[Turn]:
+def _at_ports_later(tried: _Tried, runs: Runs) -> None:
     """Effects at the ports that have waited, where nothing else is all that is missing."""
-    found: list[Turn] = []
     for start in tried.later:
         is_done = start.fit.effects in tried.through_runs
-        done = [*tried.turns.values(), *found]
-        if is_done or runs.run_tasks.are_spent or tried.are_nearly_all(done):
+        if is_done or runs.run_tasks.are_spent or tried.are_nearly_all():
             continue
-        found += _through_runs(tried, start, runs)
-    return found
+        if not tried.is_hopeless(start):
+            tried.keep(_through_runs(tried, start, runs))
 
 
-def _with_wider_law(tried: _Tried, turns: Sequence[Turn], runs: Runs) -> list[Turn]:
+def _with_wider_law(tried: _Tried, runs: Runs) -> list[Turn]:
     """Run with a richer law of the effect that leaves least, if that is still too much.
 
     A lag of first order leaves most of what one of second order has: without the latter
     others that leave no less would be as likely.
     """
     findings = tried.findings
-    if tried.are_nearly_all(turns) or runs.run_tasks.are_spent:
+    if tried.are_nearly_all() or runs.run_tasks.are_spent:
         return []
-    turns = [one for one in turns if len(one.fit.effects) == 1]
+    turns = [one for one in tried.turns.values() if len(one.fit.effects) == 1]
     if not turns:
         return []
     best = min(turns, key=lambda turn: float(turn.sse.sum()))

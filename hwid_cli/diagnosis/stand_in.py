@@ -153,12 +153,13 @@ def in_newtons(drive: StandIn, force_gain: float) -> StandIn:
     return replace(drive, **scaled)
 
 
-def force_along(drive: Drive, moved: Moved, driven_by: np.ndarray) -> np.ndarray:
+def force_along(drive: Drive, moved: Moved, signals: Signals) -> np.ndarray:
     """Force that a drive needs beside its input to move in a given way.
 
     Parameters
     ----------
-    driven_by : ndarray, shape (n_samples,), [input unit]
+    signals : Signals
+        With its input.
 
     Returns
     -------
@@ -172,8 +173,34 @@ def force_along(drive: Drive, moved: Moved, driven_by: np.ndarray) -> np.ndarray
         drive.mass_kg * moved.acceleration
         + drive.damping_N_s_per_m * moved.velocity
         + spring_force(drive, moved.position)
-        - drive.force_constant_N_per_A * along_motion(drive, driven_by)
+        - drive.force_constant_N_per_A * along_motion(drive, signals.driven_by)
+        - summed_up(drive, moved.position, signals.driven_by, signals.sample_time_s)
     )
+
+
+def summed_up(
+    drive: Drive, position: np.ndarray, driven_by: np.ndarray, sample_time_s: float
+) -> np.ndarray:
+    """Force that an integral part of a loop has summed up at every sample.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n_samples,), [m]
+    driven_by : ndarray, shape (n_samples,), [input unit]
+
+    Returns
+    -------
+    ndarray, shape (n_samples,), [N]
+
+    References
+    ----------
+    docs/method_diagnosis.md, eq. (D30f).
+    """
+    if not (isinstance(drive, StandIn) and drive.reset_per_s > 0):
+        return np.zeros(position.size)
+    driving = drive.force_constant_N_per_A * driven_by
+    driving = driving - drive.stiffness_N_per_m * position
+    return drive.reset_per_s * sample_time_s * np.r_[0.0, np.cumsum(driving[:-1])]
 
 
 def force_beside(drive: Drive, signals: Signals, moved: Moved) -> np.ndarray:
@@ -187,7 +214,7 @@ def force_beside(drive: Drive, signals: Signals, moved: Moved) -> np.ndarray:
     ndarray, shape (n_samples,), [N]
     """
     if drive.hold != HELD:
-        return force_along(drive, moved, signals.driven_by)
+        return force_along(drive, moved, signals)
     motion = Motion(moved.position, moved.position, moved.velocity, signals.driven_by)
     alone = replace(signals, force=np.zeros(0), start=seen_start(moved))
     return force_of_motion(drive, alone, motion)
@@ -226,6 +253,8 @@ def force_of_change(
     ndarray, shape (n_samples,), [N]
     """
     spring = stiffness_at(drive, position) * change.position
+    nothing = np.zeros(change.position.size)
+    spring = spring - summed_up(drive, change.position, nothing, sample_time_s)
     if drive.hold == HELD:
         # What a parameter changes jumps with the input: impulses do not.
         impulse = drive.mass_kg * np.diff(change.velocity)
@@ -286,7 +315,7 @@ def error_of(
     """
     moved = [moved_as(one, run) for one, run in zip(signals, runs, strict=True)]
     forces = [
-        force_along(drive, there, one.driven_by)
+        force_along(drive, there, one)
         for one, there in zip(signals, moved, strict=True)
     ]
     bend = _bend_along(moved, forces)
@@ -493,6 +522,7 @@ def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarra
     impulse = drive.mass_kg * np.diff(v) + drive.damping_N_s_per_m * way + area
     given = drive.force_constant_N_per_A * signals.driven_by
     beside = signals.force if signals.force.size else np.zeros(x.size)
+    beside = beside + summed_up(drive, x, signals.driven_by, dt)
     means = given[:-1] if drive.hold == HELD else _means_of_lines(given)
     # What begins in balance tells the first corner.
     is_known = signals.start is None

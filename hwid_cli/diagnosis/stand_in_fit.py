@@ -31,6 +31,7 @@ from hwid_cli.diagnosis.stand_in import (
     moved_as,
     moved_from,
     seen_start,
+    summed_up,
 )
 from hwid_cli.drive.springs import spring_force
 from hwid_cli.records.drive import LINE, StandIn
@@ -171,8 +172,9 @@ def fit_beside_integral(
 ) -> tuple[StandIn, float]:
     """Mass, damper and spring of a loop that also adds up where it is, from a push.
 
-    An integral part lets go of what lasts, and makes a damper look negative. No drive has
-    one, but what it does is slow: the turns that correct a stand-in find it.
+    An integral part lets go of what lasts, and makes a damper look negative. The drive has
+    it where there is a spring; that of a speed is a spring. Otherwise what it does is slow:
+    the turns that correct a stand-in find it.
 
     Parameters
     ----------
@@ -194,13 +196,15 @@ def fit_beside_integral(
     ])  # fmt: skip
     lengths = column_lengths(matrix)
     values, left = scipy.optimize.nnls(matrix / lengths, push)
-    mass, damping, stiffness, _ = values / lengths
+    mass, damping, stiffness, of_sum = values / lengths
+    is_way = not signals.is_velocity
     drive = StandIn(
         max(float(mass), LEAST_MASS),
         float(damping),
         float(stiffness),
         1.0,
         output=output_of(signals),
+        reset_per_s=float(of_sum / stiffness) if is_way and stiffness > 0 else 0.0,
     )
     drive = _no_faster_than_seen(drive, [signals])
     return drive, float(left**2 / max(float(push @ push), 1e-300))
@@ -265,14 +269,28 @@ def with_input_of(
     without = replace(drive, force_constant_N_per_A=0.0)
     constants = []
     for one, found in zip(signals, runs, strict=True):
-        moved = moved_as(one, found)
-        force = force_along(without, moved, one.driven_by)
-        driven_by = one.driven_by - np.mean(one.driven_by)
-        size = float(driven_by @ driven_by)
-        if size > 0:
-            constants.append(float(driven_by @ (force - np.mean(force))) / size)
+        force = force_along(without, moved_as(one, found), one)
+        columns = _driving_columns(drive, one)
+        columns = columns - np.mean(columns, axis=0)
+        if columns[:, 0].any():
+            inverse = np.linalg.pinv(columns / column_lengths(columns))
+            constant = inverse[0] @ (force - np.mean(force))
+            constants.append(float(constant) / float(column_lengths(columns)[0]))
     usual = float(np.median(constants)) if constants else 0.0
     return replace(drive, force_constant_N_per_A=usual) if usual > 0 else None
+
+
+def _driving_columns(drive: StandIn, signals: Signals) -> np.ndarray:
+    """What a force goes with that an input makes; shape (n_samples, n_columns).
+
+    A loop with an integral part sums it up, and may know how fast its reference moves.
+    """
+    driven_by, dt = signals.driven_by, signals.sample_time_s
+    if drive.reset_per_s == 0:
+        return driven_by[:, None]
+    unit = replace(drive, force_constant_N_per_A=1.0)
+    summed = summed_up(unit, np.zeros(driven_by.size), driven_by, dt)
+    return np.column_stack([driven_by + summed, np.gradient(driven_by, dt)])
 
 
 def _pushes_back(drive: StandIn, widest: float) -> bool:

@@ -227,6 +227,7 @@ def parameter_vector(drive: Drive, effects: Mapping[str, Values]) -> np.ndarray:
     vector[slots.FORCE_CONSTANT] = drive.force_constant_N_per_A
     if isinstance(drive, StandIn):
         vector[slots.QUADRATIC], vector[slots.CUBIC] = drive.bends
+        vector[slots.LOOP_RESET] = drive.reset_per_s
     vector[slots.REFERENCE_CURRENT] = drive.reference_current_A
     vector[slots.REFERENCE_DISPLACEMENT] = drive.reference_displacement_m
     vector[slots.ZERO_ORDER_HOLD] = float(drive.hold == "zero")

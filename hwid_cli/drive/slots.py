@@ -150,5 +150,6 @@ that is switched off is 0, except where the comment says infinite.
     STOP_DASHPOT,
     SIDE_DASHPOT,
     SECOND_DASHPOT,
+    LOOP_RESET,  # rate at which what drives beside the spring is summed up
     N_SLOTS,
-) = range(143)
+) = range(144)

@@ -299,6 +299,9 @@ class StandIn(Drive):
     lag_s : float, [s]
         Time constant of a lag that the simulation's input passes before it acts as a
         force; 0 for none.
+    reset_per_s : float, [1/s]
+        At which an integral part of a loop inside the simulation sums up what drives the
+        mass beside its spring; 0 for none.
     own_units : MotionUnits
         Of the simulation.
     """
@@ -307,6 +310,7 @@ class StandIn(Drive):
     cubic_N_per_m3: float = 0.0
     one_curve_N_per_m: float = 0.0
     lag_s: float = 0.0
+    reset_per_s: float = 0.0
     own_units: MotionUnits = field(default_factory=MotionUnits)
 
     @property

@@ -36,7 +36,7 @@ from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.cache import task_key
 
 NAME = "simulate"
-STAGE_VERSION = 3
+STAGE_VERSION = 4
 
 # The gun rests within this share of its stiction band, so that no reading of the lead-in
 # depends on rounding at the band's edge.

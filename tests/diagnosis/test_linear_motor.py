@@ -73,7 +73,7 @@ GIVEN = SimulationOptions(
 )
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_cogging_and_friction_of_a_free_axis_are_told_as_its_recipe_starts_it():
     options = DiagnoseOptions(
         initial_state="held",

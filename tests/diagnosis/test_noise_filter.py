@@ -268,7 +268,7 @@ def moved(wanted, seed, magnets_N=(10.0, 3.5), friction_N=0.0):
     )
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_two_rows_of_magnets_are_told_far_below_what_noise_of_the_current_adds_up_to():
     t = STEP_S * np.arange(N)
     smooth = 0.5 - 0.5 * np.cos(np.pi * np.clip((t - 0.2) / 1.2, 0, 1))
@@ -299,7 +299,7 @@ def test_two_rows_of_magnets_are_told_far_below_what_noise_of_the_current_adds_u
     assert "at last" in said
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_clean_axis_with_friction_lacks_nothing_where_noise_decides_when_it_lets_go():
     t = STEP_S * np.arange(N)
     wanted = [

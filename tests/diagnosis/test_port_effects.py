@@ -57,7 +57,7 @@ def rough(request):
     return SimulatorRun(np.round(exact, 3), np.zeros(0))
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_a_delay_that_parameters_have_imitated_is_named_alone():
     free = {
         "contact": FreeParameter(GIVEN["contact"], (1.0, 60.0)),

@@ -154,7 +154,7 @@ def with_play(angle, half_gap):
     return np.array(seen)
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_play_before_the_sensor_is_told_by_runs_of_a_flap_with_a_preloaded_spring():
     rng = np.random.default_rng(11)
     time = TICK * np.arange(900)

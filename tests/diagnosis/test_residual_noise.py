@@ -157,7 +157,7 @@ def test_what_is_fast_beside_growing_noise_is_no_noise(more):
     assert residual_noise(with_more(compared, more), before, "m") is None
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 @pytest.mark.parametrize("coefficient", [0.5, 0.9])
 def test_a_clean_machine_with_coloured_noise_in_its_loop_lacks_nothing(coefficient):
     found = diagnosed(

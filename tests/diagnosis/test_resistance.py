@@ -54,7 +54,7 @@ def test_a_winding_that_is_colder_than_stated_is_no_missing_effect():
     assert "damping_N_s_per_m" not in base
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_beside_a_drag_the_resistance_is_found_where_the_damping_vanishes():
     options = DiagnoseOptions(laws="never")
     given = list(recordings(DRAG))

@@ -16,9 +16,15 @@ from hwid_cli.diagnosis.single_effects import (
 )
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import ParameterRef
-from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
+from tests.diagnosis.made_up_fits import CRITERIA, HELD_OUT, base, made_up
 from tests.drive.drive_cases import SCALES
 
+PROBLEM = SimpleNamespace(
+    signals=[
+        SimpleNamespace(name=str(n), is_held_out=is_held_out, compared=np.ones(100))
+        for n, is_held_out in enumerate(HELD_OUT)
+    ]
+)
 # In the order in which they leave least beside the stand-in.
 LIKELY = {
     "actuator_lag:second_order": 101.0,
@@ -84,13 +90,19 @@ def test_an_effect_that_leaves_far_more_than_another_at_a_port_is_not_tried_besi
     tried = single_effects._Tried(findings)
     tried.at_ports = AtPorts({"output_backlash": 0.15, "input_delay": 0.9})
     delay = made_up(("input_delay",), 100.0)
-    assert not tried.is_told_by_ports(delay)
+    assert not tried.is_known(delay)
     play = made_up(("output_backlash",), 100.0, whiteness=0.5)
     tried.fits = {play.effects: play}
-    assert tried.is_told_by_ports(delay)
-    assert not tried.is_told_by_ports(made_up(("gravity",), 100.0))
+    assert tried.is_known(delay)
+    assert not tried.is_known(made_up(("gravity",), 100.0))
     tried.at_ports = AtPorts({"output_backlash": 0.3, "input_delay": 0.9})
-    assert not tried.is_told_by_ports(delay)
+    assert not tried.is_known(delay)
+    # Nor what runs have told before.
+    tried.given_up = {delay.effects}
+    assert tried.is_known(delay)
+    assert not tried.is_known(play)
+    tried.through_runs = {play.effects}
+    assert tried.is_known(play)
 
 
 def test_kinds_of_friction_do_not_keep_a_dead_zone_from_the_simulation():
@@ -251,6 +263,7 @@ def tried_at_ports(monkeypatch, lefts, sses, shares=()):
     """
     findings = SimpleNamespace(
         criteria=CRITERIA,
+        problem=PROBLEM,
         base=base(900.0),
         own_base=None,
         scales=SCALES,
@@ -282,28 +295,32 @@ def tried_at_ports(monkeypatch, lefts, sses, shares=()):
     monkeypatch.setattr(single_effects, "with_port_effects", fit)
     monkeypatch.setattr(single_effects, "fit_of_run", lambda _, turn: turn.fit)
     tried = single_effects._Tried(findings)
-    tried.keep(single_effects._at_ports_by_runs_alone(tried, runs, {}, may_pair=False))
+    single_effects._at_ports_by_runs_alone(tried, runs, {}, may_pair=False)
     first = list(fitted)
-    tried.keep(single_effects._at_ports_later(tried, runs))
+    single_effects._at_ports_later(tried, runs)
     return first, fitted[len(first) :]
 
 
 def test_what_leaves_much_of_few_recordings_waits_until_others_have_been_tried(
     monkeypatch,
 ):
-    lefts = {"input_saturation": 90.0, "sensor_lag": 4.0}
-    sses = {"input_saturation": 500.0, "sensor_lag": 300.0}
+    lefts = {"input_saturation": 30.0, "sensor_lag": 8.0}
+    sses = {"input_saturation": 500.0, "sensor_lag": 800.0}
     found = tried_at_ports(monkeypatch, lefts, sses)
     assert found == (["sensor_lag"], ["input_saturation"])
-    # Not at all where the first one leaves nothing.
+    # Not at all where the first one leaves nothing, or far less of the same recordings.
     sses = {"input_saturation": 500.0, "sensor_lag": 100.0}
+    assert tried_at_ports(monkeypatch, lefts, sses) == (["sensor_lag"], [])
+    sses = {"input_saturation": 500.0, "sensor_lag": 700.0}
+    assert tried_at_ports(monkeypatch, lefts, sses) == (["sensor_lag"], [])
+    lefts, sses["sensor_lag"] = {"input_saturation": 33.0, "sensor_lag": 8.0}, 800.0
     assert tried_at_ports(monkeypatch, lefts, sses) == (["sensor_lag"], [])
 
 
 def test_the_richer_law_follows_where_the_plain_one_leaves_too_much(monkeypatch):
     richer = "sensor_lag:second_order"
-    lefts = {"input_delay": 80.0, "sensor_lag": 3.0, richer: 1.0}
-    sses = {"input_delay": 500.0, "sensor_lag": 200.0, richer: 100.0}
+    lefts = {"input_delay": 11.0, "sensor_lag": 3.0, richer: 1.0}
+    sses = {"input_delay": 500.0, "sensor_lag": 300.0, richer: 100.0}
     found = tried_at_ports(monkeypatch, lefts, sses, shares=("sensor_lag", richer))
     assert found == (["sensor_lag", richer], [])
     # Only where it was asked for, and where something is left.
@@ -351,7 +368,8 @@ def test_a_second_effect_at_a_port_is_tried_beside_the_first(
     values = {"gain": 2.0, f"{ZONE}/threshold_A": 1.0, f"{DELAY}/delay_s": 3.0}
     stand_in = made_up(("gravity",), 100.0 * said)
     findings = SimpleNamespace(
-        criteria=CRITERIA, base=base(1e4), own_base=None, scales=SCALES,
+        criteria=CRITERIA, problem=PROBLEM, base=base(1e4), own_base=None,
+        scales=SCALES,
         found=SimpleNamespace(shares={}, fits={("gravity",): stand_in}),
     )  # fmt: skip
     runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))

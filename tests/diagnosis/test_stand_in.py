@@ -230,6 +230,7 @@ def test_a_loop_that_adds_up_is_told_from_a_negative_damper():
     assert drive.mass_kg == pytest.approx(MASS, rel=0.05)
     assert drive.damping_N_s_per_m == pytest.approx(DAMPING, rel=0.05)
     assert drive.stiffness_N_per_m == pytest.approx(kp, rel=0.01)
+    assert drive.reset_per_s == pytest.approx(ki / kp, rel=0.01)
     assert fit_to_push(one, push, (rest, pushed)).damping_N_s_per_m < 0.5 * DAMPING
     # Without inertia it gets a mass that samples show.
     slow = SimulatorRun(lsim(([1.0], [DAMPING, kp]), push, TIME)[1], NOTHING)
@@ -239,6 +240,56 @@ def test_a_loop_that_adds_up_is_told_from_a_negative_damper():
     rng = np.random.default_rng(1)
     rough = SimulatorRun(rng.standard_normal(N), NOTHING)
     assert fit_beside_integral(one, push, (rest, rough))[1] > 0.5
+
+
+# A loop with an integral part around a mass, of a reference: what it sums up moves it too.
+LOOP = StandIn(
+    mass_kg=MASS, damping_N_s_per_m=DAMPING, stiffness_N_per_m=STIFFNESS,
+    force_constant_N_per_A=STIFFNESS, reset_per_s=9.0,
+)  # fmt: skip
+LED_BY = ([STIFFNESS, 9.0 * STIFFNESS], [MASS, DAMPING, STIFFNESS, 9.0 * STIFFNESS])
+
+
+def test_a_stand_in_sums_up_what_drives_it_beside_its_spring():
+    reference = 1e-3 * INPUTS[0]
+    vector = parameter_vector(LOOP, {})
+    expected = lsim(LED_BY, reference, TIME)[1]
+    found = run(reference, vector, STEP_S)
+    size = float(np.max(np.abs(expected)))
+    # It sums up once in a sample.
+    assert np.max(np.abs(found.position - expected)) < 0.02 * size
+    still = run(reference, parameter_vector(replace(LOOP, reset_per_s=0.0), {}), STEP_S)
+    assert np.max(np.abs(still.position - expected)) > 0.1 * size
+    # A force is let go of.
+    force = np.full(N, 2.0)
+    start = run(np.zeros(N), vector, STEP_S, force=force - force[0])
+    assert np.max(np.abs(start.position)) == 0
+    step = np.where(np.arange(N) < 10, 0.0, 2.0)
+    pushed = run(np.zeros(N), vector, STEP_S, force=step)
+    answer = lsim(([1.0, 0.0], LED_BY[1]), step, TIME)[1]
+    largest = float(np.max(np.abs(answer)))
+    assert np.max(np.abs(pushed.position - answer)) < 0.02 * largest
+    assert abs(pushed.position[-1]) < 0.2 * largest
+
+
+def test_a_motion_needs_no_force_beside_what_its_loop_sums_up(given):
+    reference = 1e-3 * INPUTS[0]
+    one = replace(given[0], driven_by=reference)
+    motion = run(reference, parameter_vector(LOOP, {}), STEP_S)
+    force = force_of_motion(LOOP, one, motion)
+    largest = STIFFNESS * float(np.max(np.abs(motion.position)))
+    assert np.max(np.abs(force)) < 2e-3 * largest
+    moved = derived(SimulatorRun(motion.position, motion.velocity), STEP_S)
+    without = replace(LOOP, reset_per_s=0.0)
+    summed_up = np.std(force_along(without, moved, one))
+    assert summed_up > 0.03 * largest
+    assert np.std(force_along(LOOP, moved, one)) < 0.1 * summed_up
+    # A change of the motion is summed up, too.
+    more = force_of_change(LOOP, moved, 0.0 * moved.position, STEP_S)
+    summed = force_of_change(without, moved, 0.0 * moved.position, STEP_S) - more
+    np.testing.assert_allclose(
+        summed[1:], -9.0 * STIFFNESS * STEP_S * np.cumsum(moved.position)[:-1]
+    )
 
 
 @pytest.mark.thorough
@@ -259,7 +310,7 @@ def test_a_simulation_without_inertia_gets_a_mass_that_samples_show(given, lag_s
     assert settles == pytest.approx(lag_s, abs=STEP_S)
     for one, of_simulation in zip(given, runs, strict=True):
         moved = derived(of_simulation, STEP_S)
-        force = force_along(found, moved, one.driven_by)
+        force = force_along(found, moved, one)
         there = standing_for(one, of_simulation, found, force)
         size = float(np.std(of_simulation.output))
         # What the mass adds is made up for by the force along the motion.
@@ -277,7 +328,7 @@ def test_with_its_force_the_stand_in_moves_as_a_nonlinear_simulation(given):
     output = integrate(HARDENING, HARDENING.values, INPUTS[0], STEP_S)
     found = SimulatorRun(output, NOTHING)
     moved = derived(found, STEP_S)
-    force = force_along(ROUGH, moved, INPUTS[0])
+    force = force_along(ROUGH, moved, given[0])
     one = standing_for(given[0], found, ROUGH, force)
     plain = moved_plainly(ROUGH, one, force, moved)
     # By straight lines of the force between samples.
@@ -378,7 +429,7 @@ def test_the_error_of_a_stand_in_is_about_what_it_makes_wrong(share):
     wrong = 0.0
     for one, run_of, y in zip(told, runs, measured, strict=True):
         moved = derived(run_of, STEP_S)
-        force = force_along(found, moved, one.driven_by)
+        force = force_along(found, moved, one)
         wrong += float(
             np.sum((moved_plainly(right, one, force, moved).position - y) ** 2)
         )

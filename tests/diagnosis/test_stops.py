@@ -91,7 +91,7 @@ def measured(force):
     ]
 
 
-@pytest.mark.thorough
+@pytest.mark.slow
 def test_two_unequal_stops_are_one_kind_of_stop_twice():
     allowed = ("end_stop", "one_sided_stop", "coulomb_friction")
     options = DiagnoseOptions(effects=allowed, max_effects=2)

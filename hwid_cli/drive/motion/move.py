@@ -89,6 +89,9 @@ def move(
     p = given_p.copy()
     positions, velocities, given = np.empty(n), np.empty(n), command.copy()
     has_controller, control = is_closed(p), np.zeros(N_CONTROL)
+    is_reset, summed = p[slots.LOOP_RESET] > 0.0, 0.0
+    if is_reset:
+        force = force.copy() if force.size > 0 else np.zeros(n)
     before = 0.0 if has_controller else command[0]
     state, memory = np.zeros(N_STATE), np.zeros(N_MEMORY)
     at_start = force[0] if force.size > 0 else 0.0
@@ -98,9 +101,11 @@ def move(
     step = _longest_step(sample_time, kind, p)
     matrices, lengths = _make_room(sample_time, step, kind, p)
     # Pieces are listed for many samples at once, or for one after the other where the
-    # command or the temperature depends on the motion.
-    is_single = has_controller or (
-        depends_on_motion(p) and p[slots.THERMAL_LOSS] != 0.0
+    # command, a force or the temperature depends on the motion.
+    is_single = (
+        has_controller
+        or is_reset
+        or (depends_on_motion(p) and p[slots.THERMAL_LOSS] != 0.0)
     )
     pieces = np.empty((MOST_PIECES + (0 if is_single else MANY_PIECES), N_PIECE))
     pushes, ends = np.zeros((pieces.shape[0], N_PUSH)), np.empty((2, n))
@@ -115,6 +120,11 @@ def move(
                 command[sample], positions[sample], velocities[sample], sample_time,
                 control, p,
             )  # fmt: skip
+        if is_reset and sample + 1 < n:
+            driving = p[slots.FORCE_CONSTANT] * given[sample]
+            driving -= p[slots.STIFFNESS] * positions[sample]
+            summed += p[slots.LOOP_RESET] * sample_time * driving
+            force[sample + 1] += summed
         now = drawn_current(given[sample], state, p) if is_single else 0.0
         count, followed, sample = list_pieces(
             sample, sample_time, given, force, ends, before, followed, now, pieces,
