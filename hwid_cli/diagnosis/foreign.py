@@ -56,7 +56,8 @@ _MOVED = 0.01
 # it: what else is missing is looked for at once.
 _MOVED_BESIDE_NAMED = 0.05
 # Of all runs, those after which no further single effect is tried: sets need some, too. Where
-# the configuration leaves their number open, sets have some beyond them.
+# the configuration leaves their number open, what is missing beside an effect, and sets, have
+# some beyond them.
 _FOR_SINGLES, _FOR_SETS = 0.75, 1.5
 # Verdicts that a law may take the place of.
 _NAMED = ("named", "ambiguous")
@@ -272,24 +273,55 @@ def _found(
         told = alone.findings
         least = _MOVED if told is None else _MOVED_BESIDE_NAMED
         begins_anew = is_first and have_moved(values, alone.values, least)
-        if begins_anew and not _is_exact(told):
-            # What runs bear out stays unless a search from there leaves less.
-            return told or found, alone.values, told is not None
+        if begins_anew and told is None:
+            return found, alone.values, False
         # Nothing more to look for: no gap, or parameters.
         if found.verdict.word in ("none", "parameters"):
             return confirm(found, runs, values)
+        if options.max_runs is None:
+            runs = runs.up_to(_FOR_SETS)
         alone = with_further_effect(alone, runs, options, on_round)
         is_told = alone.findings is not None
         if begins_anew and not (is_told and _is_enough(alone)):
-            return told or found, alone.values, is_told
-        if options.max_runs is None:
-            runs = runs.up_to(_FOR_SETS)
+            # What runs bear out stays unless a search from there leaves less.
+            return alone.findings or found, alone.values, is_told
+        if begins_anew and not _is_exact(told):
+            alone = _single_instead(standing, singles, alone, runs, on_round) or alone
         if runs.run_tasks.are_spent or (is_told and _is_enough(alone)):
             lead = _with_runs(unconfirmed(found), alone)
             return alone.findings or lead, alone.values, is_told
     else:
         standing = _with_nearer_spring(standing, singles, runs, on_round)
     return _of_sets(standing, options, (runs, values), on_round, given_sse, alone)
+
+
+def _single_instead(
+    standing: DiagnosisProblem,
+    singles: DiagnoseOptions,
+    both: ToldByRuns,
+    runs: Runs,
+    on_round: OnRound,
+) -> ToldByRuns | None:
+    """A single effect that is all that is missing where two have led the parameters.
+
+    From there a stand-in knows it better than from where parameters had imitated it.
+
+    Parameters
+    ----------
+    singles : DiagnoseOptions
+        For single effects alone.
+    both : ToldByRuns
+        Of the simulation's run with two effects.
+    """
+    given = runs.of(standing.signals, both.values)
+    there = standing_beside(runs, standing, given, both.values)
+    found = find(there, singles, runs.run_tasks, on_round, may_cut=False)
+    found = with_own_base(found, there, runs.simulator)
+    fits = found.found.fits.values()
+    if not any(found.criteria.is_nearly_all(one, found.base) for one in fits):
+        return None
+    one = single_in_simulation(found, runs, both.values, on_round)
+    return one if one.findings is not None and one.is_all else None
 
 
 def _is_exact(told: Findings | None) -> bool:

@@ -39,6 +39,7 @@ from hwid_cli.diagnosis.through_runs import MOST_LEFT, followed
 from hwid_cli.diagnosis.turns import Turn, best_turn, fit_of_run
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE
 
@@ -119,7 +120,8 @@ def single_in_simulation(
     tried = _Tried(findings)
     likely = _likely(findings)
     criteria, base = findings.criteria, findings.base
-    if not any(criteria.is_nearly_all(one, base) for one in likely):
+    are_open = not any(criteria.is_nearly_all(one, base) for one in likely)
+    if are_open and tried.ports_are_exact:
         _at_ports_by_runs_alone(tried, runs, values, may_pair=may_pair)
     _try_likely(tried, likely, runs, values, on_round)
     _at_ports_later(tried, runs)
@@ -151,6 +153,15 @@ class _Tried:
         self.least_begun = np.inf
         # Whose runs were followed to their end.
         self.followed: set[tuple[str, ...]] = set()
+
+    @property
+    def ports_are_exact(self) -> bool:
+        """Whether a run shows an effect at a port as it is.
+
+        The forces of an effect that is there already would have to go with its motion.
+        """
+        present = drive_effects(self.findings.problem.drive)
+        return not present or acts_at_port(tuple(present))
 
     def is_known(self, one: CandidateFit) -> bool:
         """Whether runs have said what an effect leaves, whatever a stand-in says.
@@ -231,7 +242,8 @@ def _in_simulation(
     """Best runs with an effect: one at a port through runs first, which are exact."""
     findings, found = tried.findings, list[Turn]()
     is_open = one.effects not in tried.through_runs
-    if acts_at_port(one.effects) and runs.simulator.free and is_open:
+    is_exact = acts_at_port(one.effects) and tried.ports_are_exact
+    if is_exact and runs.simulator.free and is_open:
         tried.through_runs.add(one.effects)
         waiting = (each for each in tried.later if each.fit.effects == one.effects)
         start = next(waiting, None) or begin_at_port(findings, one, runs, values)

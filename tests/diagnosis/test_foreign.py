@@ -637,20 +637,26 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
 
 
 @pytest.mark.parametrize(
-    ("is_borne_out", "moved", "goes_on"),
+    ("effect", "is_borne_out", "moved", "is_enough", "asks"),
     [
         # Parameters that have moved had imitated what is missing: the search begins again,
-        # unless runs bear an effect out and they have moved by little.
-        (False, 1.03, False),
-        (True, 1.03, True),
-        (True, 1.10, False),
-        (False, 1.001, True),
+        # unless runs bear an effect out; then a second one is looked for first.
+        ("gear_backlash", False, 1.03, True, []),
+        ("gear_backlash", True, 1.03, True, ["further"]),
+        ("gear_backlash", False, 1.001, True, ["further", "sets"]),
+        ("gear_backlash", True, 1.001, False, ["further", "sets"]),
+        # Where they have moved far, one effect may be all of it from there.
+        ("gear_backlash", True, 1.10, True, ["further", "single"]),
+        ("input_delay", True, 1.10, True, ["further"]),
+        # Or the search begins again.
+        ("gear_backlash", True, 1.10, False, ["further"]),
+        ("input_delay", True, 1.10, False, ["further"]),
     ],
 )
 def test_the_search_begins_again_where_parameters_have_moved(
-    monkeypatch, is_borne_out, moved, goes_on
+    monkeypatch, effect, is_borne_out, moved, is_enough, asks
 ):
-    chosen = made_up(("gear_backlash",), 100.0)
+    chosen = made_up((effect,), 100.0)
     verdict = SimpleNamespace(word="unknown", chosen=chosen)
     found = SimpleNamespace(verdict=verdict)
     alone = ToldByRuns(found if is_borne_out else None, {"c": moved}, is_all=False)
@@ -661,8 +667,13 @@ def test_the_search_begins_again_where_parameters_have_moved(
     monkeypatch.setattr(
         foreign, "with_further_effect", lambda *_: asked.append("further") or alone
     )
-    monkeypatch.setattr(foreign, "_is_enough", lambda _: True)
-    monkeypatch.setattr(foreign, "_of_sets", lambda *_: (found, {"c": moved}, False))
+    monkeypatch.setattr(foreign, "_single_instead", lambda *_: asked.append("single"))
+    monkeypatch.setattr(foreign, "_is_enough", lambda _: is_enough)
+    monkeypatch.setattr(
+        foreign,
+        "_of_sets",
+        lambda *_: asked.append("sets") or (found, {"c": moved}, is_borne_out),
+    )
     monkeypatch.setattr(foreign, "_with_runs", lambda one, _: one)
     monkeypatch.setattr(foreign, "unconfirmed", lambda one: one)
     runs = Runs(SimpleNamespace(run=simulate), CountedRuns(None))
@@ -674,9 +685,35 @@ def test_the_search_begins_again_where_parameters_have_moved(
         None,
         is_first=True,
     )
-    assert bool(asked) is goes_on
+    assert asked == asks
     assert (told, values) == (found, {"c": moved})
     assert is_told is is_borne_out
+
+
+@pytest.mark.parametrize(
+    ("left", "is_all", "is_taken"),
+    [(101.0, True, True), (101.0, False, False), (300.0, True, False)],
+)
+def test_one_effect_takes_the_place_of_two_where_it_is_all_that_is_missing(
+    monkeypatch, left, is_all, is_taken
+):
+    whiteness = 0.5 if left < 200.0 else 9.0
+    fit = made_up(("stribeck_friction",), left, whiteness=whiteness)
+    found = SimpleNamespace(
+        criteria=CRITERIA,
+        base=base(900.0),
+        found=SimpleNamespace(fits={fit.effects: fit}),
+    )
+    one = ToldByRuns(found, {"c": 2.0}, is_all)
+    monkeypatch.setattr(foreign, "standing_beside", lambda *_: None)
+    monkeypatch.setattr(foreign, "find", lambda *_, **__: found)
+    monkeypatch.setattr(foreign, "with_own_base", lambda one, *_: one)
+    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_: one)
+    both = ToldByRuns(found, {"c": 1.5}, is_all=True)
+    runs = SimpleNamespace(of=lambda *_: [], run_tasks=None, simulator=None)
+    standing = SimpleNamespace(signals=[])
+    told = foreign._single_instead(standing, DiagnoseOptions(), both, runs, None)
+    assert told is (one if is_taken else None)
 
 
 @pytest.mark.parametrize(

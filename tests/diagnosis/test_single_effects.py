@@ -16,14 +16,16 @@ from hwid_cli.diagnosis.single_effects import (
 )
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import ParameterRef
+from hwid_cli.records.drive import StandIn
 from tests.diagnosis.made_up_fits import CRITERIA, HELD_OUT, base, made_up
 from tests.drive.drive_cases import SCALES
 
 PROBLEM = SimpleNamespace(
+    drive=StandIn(1.0, 1.0, 1.0, 1.0),
     signals=[
         SimpleNamespace(name=str(n), is_held_out=is_held_out, compared=np.ones(100))
         for n, is_held_out in enumerate(HELD_OUT)
-    ]
+    ],
 )
 # In the order in which they leave least beside the stand-in.
 LIKELY = {
@@ -71,7 +73,9 @@ def test_an_effect_at_a_port_is_fitted_through_runs_first(
     monkeypatch.setattr(single_effects, "with_port_effects", lambda *_: run)
     monkeypatch.setattr(single_effects, "fit_of_run", lambda findings, turn: turn)
     monkeypatch.setattr(single_effects, "settled", by_turns)
-    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0), own_base=None)
+    findings = SimpleNamespace(
+        criteria=CRITERIA, problem=PROBLEM, base=base(900.0), own_base=None
+    )
     runs = SimpleNamespace(
         simulator=SimpleNamespace(free={"gain": None}),
         run_tasks=SimpleNamespace(are_spent=False),
@@ -83,6 +87,20 @@ def test_an_effect_at_a_port_is_fitted_through_runs_first(
     # Not twice.
     single_effects._in_simulation(tried, lag, runs, {})
     assert turns == [*settled, "actuator_lag"]
+
+
+@pytest.mark.parametrize(
+    ("present", "is_exact"),
+    [
+        ({}, True),
+        ({"input_delay": {"delay_s": 0.02}}, True),
+        ({"coulomb_friction": {"force_N": 1.0}}, False),
+    ],
+)
+def test_beside_a_force_no_run_shows_an_effect_at_a_port_as_it_is(present, is_exact):
+    drive = replace(PROBLEM.drive, effects=present)
+    tried = single_effects._Tried(SimpleNamespace(problem=SimpleNamespace(drive=drive)))
+    assert tried.ports_are_exact is is_exact
 
 
 def test_an_effect_that_leaves_far_more_than_another_at_a_port_is_not_tried_beside_it():
