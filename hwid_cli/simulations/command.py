@@ -2,7 +2,7 @@
 
 ``{inputs}`` stands for a CSV file with the time and the inputs, ``{parameters}`` for a JSON
 file, ``{outputs}`` for the CSV file that the program writes. Every run has a folder of its
-own for them; the program starts in the folder of the configuration.
+own for them. Files that its arguments name are looked for in the configuration's folder.
 """
 
 import hashlib

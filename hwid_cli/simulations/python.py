@@ -32,6 +32,8 @@ from hwid_cli.simulations.simulation import (
 
 _PROCESS = IsolatedReader("hwid_cli.simulations.python", "the function")
 _ARGUMENTS = 3
+# Marks a module as loaded here.
+_IS_SIMULATION = "_is_a_simulation_of_hwid"
 
 
 def _run(options: PythonSimulation, request: RunRequest) -> SimulatorRun:
@@ -126,11 +128,14 @@ def _function(file: str, name: str) -> Any:
 def _module(file: str) -> ModuleType:
     # What lies beside it can be imported, as when it is run itself.
     sys.path.insert(0, str(Path(file).parent))
-    spec = importlib.util.spec_from_file_location("hwid_simulation", file)
+    name = _module_name(Path(file).stem)
+    spec = importlib.util.spec_from_file_location(name, file)
     if spec is None or spec.loader is None:
         raise ValueError("is no Python file; expected a name that ends in .py")
     module = importlib.util.module_from_spec(spec)
-    sys.modules["hwid_simulation"] = module
+    # What it keeps compiled names it so, and is read by the user's own scripts as well.
+    setattr(module, _IS_SIMULATION, True)
+    sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
     except SystemExit as error:
@@ -138,6 +143,13 @@ def _module(file: str) -> ModuleType:
     except Exception as error:
         raise ValueError(f"its file does not run: {_said(error, file)}") from error
     return module
+
+
+def _module_name(stem: str) -> str:
+    """Name of the module of a file, which takes the place of no other one."""
+    before = sys.modules.get(stem)
+    is_taken = before is not None and not hasattr(before, _IS_SIMULATION)
+    return "hwid_simulation" if is_taken or not stem.isidentifier() else stem
 
 
 def _capabilities(options: PythonSimulation) -> Capabilities:

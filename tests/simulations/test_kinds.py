@@ -1,6 +1,7 @@
 """Simulations of the user's own: functions, programs and models, and what goes wrong."""
 
 import json
+import subprocess
 import sys
 import time
 from dataclasses import replace
@@ -68,6 +69,42 @@ def test_without_a_force_the_force_input_is_zero(python):
     found = kind_named("python").run(python, request(python, np.zeros(0)))
     plain = lsim(([9.0], [0.8, 11.0, 2100.0]), INPUT, TIME)[1]
     np.testing.assert_allclose(found.output, plain, atol=1e-9)
+
+
+COMPILED = """import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def doubled(values):
+    return 2.0 * values
+
+
+def simulate(time_s, inputs, parameters):
+    return {"displacement_m": doubled(inputs["current_A"]), "speed": 0.0 * time_s}
+"""
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["plant", "signal", "my plant"])
+def test_what_a_function_keeps_compiled_can_be_read_by_its_own_scripts(
+    python, tmp_path, name
+):
+    """numba names the module of what it keeps: nobody else knew hwid's name for it."""
+    folder = tmp_path / "own"
+    folder.mkdir()
+    file = folder / f"{name}.py"
+    file.write_text(COMPILED)
+    options = replace(python, file=str(file))
+    np.testing.assert_array_equal(run(options).output, 2.0 * INPUT)
+    if name != "plant":
+        return
+    script = "import numpy as np, plant; print(plant.doubled(np.ones(2)))"
+    said = subprocess.run(
+        [sys.executable, "-c", script], cwd=folder, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert said.stdout == "[2. 2.]\n", said.stderr
 
 
 @pytest.mark.thorough
