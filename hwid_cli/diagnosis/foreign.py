@@ -59,6 +59,9 @@ _MOVED_BESIDE_NAMED = 0.05
 # the configuration leaves their number open, what is missing beside an effect, and sets, have
 # some beyond them.
 _FOR_SINGLES, _FOR_SETS = 0.75, 1.5
+# A law of one term that leaves at most this share of what single effects leave beside the
+# stand-in, in squares over the noise, is put into the simulation before them, [-].
+_FAR_LESS = 0.1
 # Verdicts that a law may take the place of.
 _NAMED = ("named", "ambiguous")
 # Factors of the stand-in that are none: as far as parameters are told, at most and at
@@ -264,6 +267,9 @@ def _found(
             standing, singles, runs.run_tasks, on_round, given_sse, may_cut=False
         )
         found = with_own_base(found, standing, runs.simulator)
+        law = _short_law(standing, options, simulation, found, on_round)
+        if law is not None:
+            return law
         some = runs.up_to(_FOR_SINGLES)
         alone = single_in_simulation(
             found, some, values, on_round, may_pair=options.max_effects > 1
@@ -273,8 +279,9 @@ def _found(
         told = alone.findings
         least = _MOVED if told is None else _MOVED_BESIDE_NAMED
         begins_anew = is_first and have_moved(values, alone.values, least)
-        if begins_anew and told is None:
-            return found, alone.values, False
+        if begins_anew and not _is_exact(told):
+            # What runs bear out stays unless a search from there leaves less.
+            return told or found, alone.values, told is not None
         # Nothing more to look for: no gap, or parameters.
         if found.verdict.word in ("none", "parameters"):
             return confirm(found, runs, values)
@@ -282,11 +289,8 @@ def _found(
             runs = runs.up_to(_FOR_SETS)
         alone = with_further_effect(alone, runs, options, on_round)
         is_told = alone.findings is not None
-        if begins_anew and not (is_told and _is_enough(alone)):
-            # What runs bear out stays unless a search from there leaves less.
+        if begins_anew and not _is_enough(alone):
             return alone.findings or found, alone.values, is_told
-        if begins_anew and not _is_exact(told):
-            alone = _single_instead(standing, singles, alone, runs, on_round) or alone
         if runs.run_tasks.are_spent or (is_told and _is_enough(alone)):
             lead = _with_runs(unconfirmed(found), alone)
             return alone.findings or lead, alone.values, is_told
@@ -295,33 +299,45 @@ def _found(
     return _of_sets(standing, options, (runs, values), on_round, given_sse, alone)
 
 
-def _single_instead(
+def _short_law(
     standing: DiagnosisProblem,
-    singles: DiagnoseOptions,
-    both: ToldByRuns,
-    runs: Runs,
+    options: DiagnoseOptions,
+    simulation: tuple[Runs, dict[str, float]],
+    found: Findings,
     on_round: OnRound,
-) -> ToldByRuns | None:
-    """A single effect that is all that is missing where two have led the parameters.
+) -> tuple[Findings, dict[str, float], bool] | None:
+    """A law of one term that is all that is missing, where no single effect may be.
 
-    From there a stand-in knows it better than from where parameters had imitated it.
+    Both are of the same stand-in: an effect of the catalogue that is missing would leave
+    as little beside it.
 
     Parameters
     ----------
-    singles : DiagnoseOptions
-        For single effects alone.
-    both : ToldByRuns
-        Of the simulation's run with two effects.
+    found : Findings
+        Of single effects.
     """
-    given = runs.of(standing.signals, both.values)
-    there = standing_beside(runs, standing, given, both.values)
-    found = find(there, singles, runs.run_tasks, on_round, may_cut=False)
-    found = with_own_base(found, there, runs.simulator)
+    runs, values = simulation
     fits = found.found.fits.values()
-    if not any(found.criteria.is_nearly_all(one, found.base) for one in fits):
+    are_open = found.verdict.word not in ("none", "parameters")
+    if not (are_open and _may_be_law(options)) or runs.run_tasks.are_spent:
         return None
-    one = single_in_simulation(found, runs, both.values, on_round)
-    return one if one.findings is not None and one.is_all else None
+    if any(found.criteria.is_nearly_all(one, found.base) for one in fits):
+        return None
+    only = replace(options, laws="only")
+    law = find(standing, only, runs.run_tasks, on_round)
+    if law.law is None or len(law.law.terms) > 1:
+        return None
+    least = min(found.criteria.excess(one) for one in (found.base, *fits))
+    if law.criteria.excess(law.verdict.chosen) > _FAR_LESS * least:
+        return None
+    on_round("the law in the simulation", 0)
+    told, moved, is_confirmed = confirm(law, runs, values)
+    return (told, moved, True) if is_confirmed and told.verdict.is_complete else None
+
+
+def _may_be_law(options: DiagnoseOptions) -> bool:
+    """Whether a law may take the place of what the catalogue holds."""
+    return options.laws == "auto" and options.effects is None
 
 
 def _is_exact(told: Findings | None) -> bool:
@@ -440,10 +456,9 @@ def _law_instead(
     values : dict of str to float
         Parameters of the simulation that no effect has moved.
     """
-    is_open = options.laws == "auto" and options.effects is None
     if (
         runs.run_tasks.are_spent
-        or not is_open
+        or not _may_be_law(options)
         or verdict.word not in _NAMED
         or verdict.is_complete
     ):

@@ -618,6 +618,7 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
     one = find(None, DiagnoseOptions()) if is_borne_out else None
     asked.clear()
     alone = ToldByRuns(one, {"c": 1.0}, is_all=False)
+    monkeypatch.setattr(foreign, "_short_law", lambda *_: None)
     monkeypatch.setattr(foreign, "find", find)
     monkeypatch.setattr(foreign, "belongs_to", lambda *_: True)
     monkeypatch.setattr(foreign, "with_further_effect", lambda first, *_: first)
@@ -640,16 +641,14 @@ def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
     ("effect", "is_borne_out", "moved", "is_enough", "asks"),
     [
         # Parameters that have moved had imitated what is missing: the search begins again,
-        # unless runs bear an effect out; then a second one is looked for first.
+        # unless runs bear an effect out and they have moved by little.
         ("gear_backlash", False, 1.03, True, []),
         ("gear_backlash", True, 1.03, True, ["further"]),
+        ("gear_backlash", True, 1.10, True, []),
         ("gear_backlash", False, 1.001, True, ["further", "sets"]),
         ("gear_backlash", True, 1.001, False, ["further", "sets"]),
-        # Where they have moved far, one effect may be all of it from there.
-        ("gear_backlash", True, 1.10, True, ["further", "single"]),
+        # An effect at a port was fitted from everywhere: a second one is looked for first.
         ("input_delay", True, 1.10, True, ["further"]),
-        # Or the search begins again.
-        ("gear_backlash", True, 1.10, False, ["further"]),
         ("input_delay", True, 1.10, False, ["further"]),
     ],
 )
@@ -667,7 +666,7 @@ def test_the_search_begins_again_where_parameters_have_moved(
     monkeypatch.setattr(
         foreign, "with_further_effect", lambda *_: asked.append("further") or alone
     )
-    monkeypatch.setattr(foreign, "_single_instead", lambda *_: asked.append("single"))
+    monkeypatch.setattr(foreign, "_short_law", lambda *_: None)
     monkeypatch.setattr(foreign, "_is_enough", lambda _: is_enough)
     monkeypatch.setattr(
         foreign,
@@ -688,32 +687,6 @@ def test_the_search_begins_again_where_parameters_have_moved(
     assert asked == asks
     assert (told, values) == (found, {"c": moved})
     assert is_told is is_borne_out
-
-
-@pytest.mark.parametrize(
-    ("left", "is_all", "is_taken"),
-    [(101.0, True, True), (101.0, False, False), (300.0, True, False)],
-)
-def test_one_effect_takes_the_place_of_two_where_it_is_all_that_is_missing(
-    monkeypatch, left, is_all, is_taken
-):
-    whiteness = 0.5 if left < 200.0 else 9.0
-    fit = made_up(("stribeck_friction",), left, whiteness=whiteness)
-    found = SimpleNamespace(
-        criteria=CRITERIA,
-        base=base(900.0),
-        found=SimpleNamespace(fits={fit.effects: fit}),
-    )
-    one = ToldByRuns(found, {"c": 2.0}, is_all)
-    monkeypatch.setattr(foreign, "standing_beside", lambda *_: None)
-    monkeypatch.setattr(foreign, "find", lambda *_, **__: found)
-    monkeypatch.setattr(foreign, "with_own_base", lambda one, *_: one)
-    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_: one)
-    both = ToldByRuns(found, {"c": 1.5}, is_all=True)
-    runs = SimpleNamespace(of=lambda *_: [], run_tasks=None, simulator=None)
-    standing = SimpleNamespace(signals=[])
-    told = foreign._single_instead(standing, DiagnoseOptions(), both, runs, None)
-    assert told is (one if is_taken else None)
 
 
 @pytest.mark.parametrize(
@@ -773,6 +746,47 @@ def test_a_search_that_its_runs_have_ended_says_so(count, is_complete, left, is_
     )
 
 
+@pytest.mark.parametrize(
+    ("of_single", "terms", "of_law", "left_of_run", "is_told"),
+    [
+        # A law of one term that leaves far less than single effects do is run ...
+        (700.0, 1, 110.0, 100.5, True),
+        # ... and told if nothing is left then.
+        (700.0, 1, 110.0, 130.0, False),
+        (700.0, 2, 101.0, 100.5, False),
+        (700.0, 1, 170.0, 100.5, False),
+        # An effect of the catalogue that may be all comes first.
+        (101.0, 1, 100.5, 100.5, False),
+    ],
+)
+def test_a_law_of_one_term_is_run_before_effects_that_leave_far_more(
+    monkeypatch, of_single, terms, of_law, left_of_run, is_told
+):
+    def fit(sse):
+        return made_up(("gravity",), sse, whiteness=0.5 if sse < 120.0 else 9.0)
+
+    def findings(sse, law=None):
+        verdict = SimpleNamespace(
+            word="unknown", chosen=fit(sse), is_complete=sse < 120.0
+        )
+        return SimpleNamespace(
+            criteria=CRITERIA, base=base(900.0), verdict=verdict, law=law,
+            found=SimpleNamespace(fits={("gravity",): fit(sse)}),
+        )  # fmt: skip
+
+    law = SimpleNamespace(terms=[None] * terms)
+    monkeypatch.setattr(foreign, "find", lambda *_: findings(of_law, law))
+    told = findings(left_of_run)
+    monkeypatch.setattr(foreign, "confirm", lambda *_: (told, {"c": 2.0}, True))
+    simulation = SimpleNamespace(run_tasks=CountedRuns(None)), {"c": 1.0}
+    given = None, DiagnoseOptions(), simulation, findings(of_single), lambda *_: None
+    expected = (told, {"c": 2.0}, True) if is_told else None
+    assert foreign._short_law(*given) == expected
+    # Not where somebody has named the effects to look for.
+    asked = replace(given[1], effects=("gravity",))
+    assert foreign._short_law(None, asked, *given[2:]) is None
+
+
 @pytest.mark.parametrize(("given", "most"), [(None, 1.5), (800, 1.0)])
 def test_sets_have_runs_beyond_those_of_single_effects_where_these_are_open(
     monkeypatch, given, most
@@ -781,6 +795,7 @@ def test_sets_have_runs_beyond_those_of_single_effects_where_these_are_open(
     verdict = SimpleNamespace(word="unknown", chosen=made_up((), 100.0))
     found = SimpleNamespace(verdict=verdict)
     alone = ToldByRuns(None, {}, is_all=False)
+    monkeypatch.setattr(foreign, "_short_law", lambda *_: None)
     monkeypatch.setattr(foreign, "find", lambda *_, **__: found)
     monkeypatch.setattr(foreign, "with_further_effect", lambda first, *_: first)
     monkeypatch.setattr(foreign, "single_in_simulation", lambda *_, **__: alone)
