@@ -59,6 +59,8 @@ _MOVED_BESIDE_NAMED = 0.05
 # the configuration leaves their number open, what is missing beside an effect, and sets, have
 # some beyond them.
 _FOR_SINGLES, _FOR_SETS = 0.75, 1.5
+# Runs that are left in any case for a law in the place of what is named.
+_FOR_LAW = 100
 # A law of one term that leaves at most this share of what single effects leave beside the
 # stand-in, in squares over the noise, is put into the simulation before them, [-].
 _FAR_LESS = 0.1
@@ -456,6 +458,8 @@ def _law_instead(
     values : dict of str to float
         Parameters of the simulation that no effect has moved.
     """
+    if options.max_runs is None:
+        runs = replace(runs, run_tasks=runs.run_tasks.at_least(_FOR_LAW))
     if (
         runs.run_tasks.are_spent
         or not _may_be_law(options)

@@ -866,13 +866,16 @@ def test_an_effect_that_the_simulation_cannot_be_run_with_is_not_confirmed():
         ({"left": 120.0}, False),
         ({"is_complete": True}, False),
         ({"laws": "never"}, False),
+        # Runs are left for it unless the configuration has limited them.
+        ({"is_spent": True}, True),
+        ({"is_spent": True, "max_runs": 500}, False),
     ],
 )
 def test_a_law_takes_the_place_of_a_name_that_leaves_far_more(
     monkeypatch, changes, is_taken
 ):
     case = {"n_terms": 1, "is_confirmed": True, "left": 104.0, "is_complete": False}
-    case |= {"laws": "auto"} | changes
+    case |= {"laws": "auto", "is_spent": False, "max_runs": None} | changes
     law = made_up(("law",), case["left"])
     found = SimpleNamespace(
         law=SimpleNamespace(terms=range(case["n_terms"])),
@@ -886,12 +889,19 @@ def test_a_law_takes_the_place_of_a_name_that_leaves_far_more(
     )
     # 1.12 times the noise, and 1.02 with the law.
     named = made_up(("quadratic_drag",), 125.0)
+
+    def run(_tasks, **_):
+        return []
+
     told = foreign._law_instead(
-        SimpleNamespace(of=lambda *_: [], run_tasks=CountedRuns(None)),
+        Runs(
+            SimpleNamespace(run=simulate),
+            CountedRuns(run, 0 if case["is_spent"] else np.inf),
+        ),
         SimpleNamespace(signals=()),
         DiagnosisVerdict("named", case["is_complete"], named, ()),
         {"kt": 1.0},
-        DiagnoseOptions(laws=case["laws"]),
+        DiagnoseOptions(laws=case["laws"], max_runs=case["max_runs"]),
         lambda *_: None,
     )
     assert told == ((found, {"kt": 2.0}) if is_taken else None)
