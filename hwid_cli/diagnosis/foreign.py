@@ -61,8 +61,8 @@ _MOVED_BESIDE_NAMED = 0.05
 _FOR_SINGLES, _FOR_SETS = 0.75, 1.5
 # Runs that are left in any case for a law in the place of what is named.
 _FOR_LAW = 100
-# A law of one term that leaves at most this share of what single effects leave beside the
-# stand-in, in squares over the noise, is put into the simulation before them, [-].
+# A law of one term that leaves nothing, or at most this share of what single effects leave
+# beside the stand-in, in squares over the noise, is put into the simulation before them, [-].
 _FAR_LESS = 0.1
 # Verdicts that a law may take the place of.
 _NAMED = ("named", "ambiguous")
@@ -330,7 +330,9 @@ def _short_law(
     if law.law is None or len(law.law.terms) > 1:
         return None
     least = min(found.criteria.excess(one) for one in (found.base, *fits))
-    if law.criteria.excess(law.verdict.chosen) > _FAR_LESS * least:
+    chosen, criteria = law.verdict.chosen, law.criteria
+    is_far_less = criteria.excess(chosen) <= _FAR_LESS * least
+    if not (is_far_less or criteria.is_complete(chosen)):
         return None
     on_round("the law in the simulation", 0)
     told, moved, is_confirmed = confirm(law, runs, values)

@@ -755,6 +755,9 @@ def test_a_search_that_its_runs_have_ended_says_so(count, is_complete, left, is_
         (700.0, 1, 110.0, 130.0, False),
         (700.0, 2, 101.0, 100.5, False),
         (700.0, 1, 170.0, 100.5, False),
+        # Or that leaves nothing beside the stand-in, where each of them leaves something.
+        (180.0, 1, 119.0, 100.5, True),
+        (180.0, 1, 125.0, 100.5, False),
         # An effect of the catalogue that may be all comes first.
         (101.0, 1, 100.5, 100.5, False),
     ],
