@@ -23,6 +23,7 @@ import scipy
 
 from hwid_cli.compiled import compiled
 from hwid_cli.diagnosis.problem import Compared
+from hwid_cli.diagnosis.stand_in import summed_up
 from hwid_cli.drive.simulation import push_and_damping
 from hwid_cli.records.diagnosis import NoiseFloor
 from hwid_cli.records.drive import Controller, Drive
@@ -343,9 +344,11 @@ def latent_force(
             error, copy.transition, copy.reading, gains.filter, gains.count, back
         )
         spread = copy.sizes[2] * np.sqrt(np.maximum(variance, 0.0))
+        # What a loop sums up of the error acts against the force, and is no part of it.
+        by_loop = summed_up(drive, states[:, 0], np.zeros(error.size), time)
         smoothed.append(
             Smoothed(
-                force=states[:, 2],
+                force=states[:, 2] - by_loop,
                 position=finite(one.position) + states[:, 0],
                 velocity=finite(one.velocity) + states[:, 1],
                 spread=spread,

@@ -105,16 +105,15 @@ def standing_beside(
     simulator = runs.simulator
     drive = _standing(runs, problem, given)
     drive = force_in_newtons(runs, problem.signals, given, values, drive)
-    has_force = simulator.capabilities.force
+    way = way_unit(problem.unit) if drive.output == "velocity" else problem.unit
+    force = problem.input_unit
+    if simulator.capabilities.force:
+        force = "N m" if way == "rad" else "N"
     drive = replace(
         drive,
         hold=problem.drive.hold,
         effects={k: dict(v) for k, v in simulator.effects.items()},
-        own_units=MotionUnits(
-            "N" if has_force else problem.input_unit,
-            way_unit(problem.unit) if drive.output == "velocity" else problem.unit,
-            problem.input_unit,
-        ),
+        own_units=MotionUnits(force, way, problem.input_unit),
     )
     standing = _with_stand_in(problem, drive, given)
     standing = replace(standing, drive=with_change(drive, simulator.change))

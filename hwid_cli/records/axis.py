@@ -136,7 +136,16 @@ def unit_in(units: MotionUnits, unit: str) -> str:
     '(rev/min)/%'
     >>> unit_in(MotionUnits(), "N/m")
     'N/m'
+
+    Beside an angle a force is a torque:
+
+    >>> turning = MotionUnits("N m", "rad", "V")
+    >>> unit_in(turning, "N m"), unit_in(turning, "N s/m^2"), unit_in(turning, "A")
+    ('N m', 'N m s/rad^2', 'V')
     """
+    if units.force == _ROTARY_UNITS["N"]:
+        there = unit_on("rotary", unit)
+        return unit_in(MotionUnits(source=units.source), there)
     of = dict(zip(astuple(MotionUnits()), astuple(units), strict=True))
 
     def own(factor: str) -> str:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hwid_cli.records.axis import unit_of_effect
+from hwid_cli.records.axis import unit_of_effect, unit_on
 from hwid_cli.records.candidates import CAUSES
 from hwid_cli.records.diagnosis import (
     SMALL_REMAINDER,
@@ -73,6 +73,12 @@ def _product(words: str) -> str:
 # Joins the effects of a candidate.
 AND = " + "
 NO_EFFECT = "no effect added"
+
+
+def missing_force(diagnosis: Diagnosis) -> tuple[str, str]:
+    """What a simulation lacks, in words, and its unit: a torque on an angle."""
+    unit = unit_on(diagnosis.axis, diagnosis.units.force)
+    return "torque F" if unit == "N m" else "force F", unit
 
 
 def candidate_name(effects: Sequence[str]) -> str:

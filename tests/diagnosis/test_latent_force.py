@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lsim
 
 from hwid_cli.diagnosis.latent_force import latent_force
 from hwid_cli.diagnosis.problem import Compared, Signals
 from hwid_cli.drive.simulation import simulate_drive
-from hwid_cli.records.drive import Controller
+from hwid_cli.records.drive import Controller, StandIn
 from tests.diagnosis.diagnosed import (
     DRIVE,
     FULL_SCALE,
@@ -45,6 +46,25 @@ def test_a_cubic_spring_comes_back_as_force_and_motion():
     # Smoothing beats the noise of a single sample.
     assert np.std(together(found, "position") - position) < 0.6 * SIGMA
     assert np.std(together(found, "velocity") - velocity) < 0.02 * np.std(velocity)
+
+
+def test_what_a_loop_sums_up_is_no_part_of_the_force_that_lasts():
+    time = SAMPLE_TIME_S * np.arange(3000)
+    push = 0.4 * np.clip(time / 0.5, 0.0, 1.0)
+    mass, damping, stiffness, reset = 0.6, 6.2, 36.0, 4.0
+    loop = ([1.0, 0.0], [mass, damping, stiffness, reset * stiffness])
+    error, nothing = lsim(loop, push, time)[1], np.zeros(time.size)
+    signals = Signals("a", "ramp", nothing, error, nothing, error, SAMPLE_TIME_S)
+    pair = Compared(signals, nothing, nothing, nothing)
+    stand_in = StandIn(mass, damping, stiffness, stiffness, reset_per_s=reset)
+
+    (found,) = latent_force([pair], stand_in, white(0.0))
+    (without,) = latent_force([pair], replace(stand_in, reset_per_s=0.0), white(0.0))
+
+    inside = slice(50, -50)
+    assert np.max(np.abs(found.force - push)[inside]) < 0.01 * 0.4
+    # A loop lets go of what lasts.
+    assert abs(without.force[-60]) < 0.2 * 0.4
 
 
 def test_without_noise_a_slow_force_is_exact():

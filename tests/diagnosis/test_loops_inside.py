@@ -84,5 +84,6 @@ def test_the_weight_that_a_loop_has_settled_against_is_named():
     assert [one.id for one in told.effects] == ["gravity"]
     assert told.complete
     assert told.confirmed == "simulation"
+    assert told.units.force == "N m"
     torque = told.effects[0].parameters[0]
     assert torque.value == pytest.approx(WEIGHT, rel=0.02)

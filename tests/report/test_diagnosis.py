@@ -18,6 +18,7 @@ from hwid_cli.report.diagnosis import (
     diagnosis_blocks,
     effects_table,
     gap_table,
+    missing_force,
     moved_parameters,
     quantity_and_unit,
     ranking_table,
@@ -381,3 +382,18 @@ def test_a_name_of_the_users_says_its_unit_only_where_it_can_mean_one(name, told
     found = replace(named(), base=(BaseParameter(name, 1.0, 2.0, 2.0),))
     one = moved_parameters(found)[0]
     assert (one.quantity, one.unit) == told
+
+
+@pytest.mark.parametrize(
+    ("axis", "force", "said"),
+    [
+        ("linear", "N", ("force F", "N")),
+        ("rotary", "N", ("torque F", "N m")),
+        # In a simulation of one's own, at its force input or through its input.
+        ("linear", "N m", ("torque F", "N m")),
+        ("linear", "V", ("force F", "V")),
+    ],
+)
+def test_what_is_missing_on_an_angle_is_a_torque(axis, force, said):
+    units = MotionUnits(force=force)
+    assert missing_force(replace(named(), axis=axis, units=units)) == said

@@ -13,6 +13,7 @@ from hwid_cli.records.diagnosis import (
     LatentForce,
     Overlay,
 )
+from hwid_cli.report.diagnosis import missing_force
 from hwid_cli.report.figures.diagnosis_bars import shortened
 from hwid_cli.report.figures.style import (
     BLACK,
@@ -207,8 +208,8 @@ def force_figure(diagnosis: Diagnosis) -> Figure:
     for axes, force in zip(panels, shown, strict=True):
         _draw_force(axes, force)
     panels[0].set_ylim(*_force_limits(shown))
-    what = "force F [N]" if diagnosis.axis == "linear" else "torque F [N m]"
-    panels[0].set_ylabel(f"missing {what}")
+    what, unit = missing_force(diagnosis)
+    panels[0].set_ylabel(f"missing {what} [{unit}]")
     _write_powers_above(panels[0])
     figure.legend(
         handles=[*panels[0].get_lines()[1:], *panels[0].collections],

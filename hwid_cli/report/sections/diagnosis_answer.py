@@ -29,6 +29,7 @@ from hwid_cli.report.charts import (
 )
 from hwid_cli.report.diagnosis import (
     leaves_little,
+    missing_force,
     moved_parameters,
     quantity_and_unit,
     says_what_was_run,
@@ -291,7 +292,7 @@ def force_chart(
     force: LatentForce, diagnosis: Diagnosis, *, height_px: int = 230
 ) -> Chart:
     """The force that the simulation lacks over a variable, with the law drawn in."""
-    what, unit = ("force F", "N") if diagnosis.axis == "linear" else ("torque F", "N m")
+    what, unit = missing_force(diagnosis)
     low, high = force.mean - force.spread, force.mean + force.spread
     curves = [
         Curve("spread, \N{PLUS-MINUS SIGN}1 sd", low, "noise", "band", upper=high),
