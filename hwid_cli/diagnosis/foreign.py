@@ -17,14 +17,13 @@ from hwid_cli.diagnosis.confirmation import confirm, unconfirmed
 from hwid_cli.diagnosis.diagnose import find, held_out_of
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.further_effects import with_further_effect
-from hwid_cli.diagnosis.laws import MOST_OF_NAMED
+from hwid_cli.diagnosis.laws_in_simulation import law_instead, short_law
 from hwid_cli.diagnosis.leads_in_simulation import leads_in_simulation
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.own_base import judged_by_own_base, with_own_base
 from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin, starts_sentence, with_starts
-from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator, most_runs
 from hwid_cli.diagnosis.single_effects import ToldByRuns, single_in_simulation
 from hwid_cli.diagnosis.stand_in import (
@@ -42,7 +41,6 @@ from hwid_cli.diagnosis.untold import (
     with_interval,
     without_forces_told,
 )
-from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
 from hwid_cli.records.drive import StandIn
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -59,13 +57,6 @@ _MOVED_BESIDE_NAMED = 0.05
 # the configuration leaves their number open, what is missing beside an effect, and sets, have
 # some beyond them.
 _FOR_SINGLES, _FOR_SETS = 0.75, 1.5
-# Runs that are left in any case for a law in the place of what is named.
-_FOR_LAW = 100
-# A law of one term that leaves nothing, or at most this share of what single effects leave
-# beside the stand-in, in squares over the noise, is put into the simulation before them, [-].
-_FAR_LESS = 0.1
-# Verdicts that a law may take the place of.
-_NAMED = ("named", "ambiguous")
 # Factors of the stand-in that are none: as far as parameters are told, at most and at
 # least by these shares, [-].
 _SLIGHT, _LARGEST_SLIGHT = 1e-4, 0.01
@@ -109,7 +100,7 @@ def diagnose_foreign(
     search = _searched(begun, given, refitted, options, on_round)
     found, values = search.findings, search.values
     if search.is_confirmed and not _is_all_but_nothing(found):
-        law = _law_instead(
+        law = law_instead(
             runs, begun.problem, found.verdict, refitted, options, on_round
         )
         found, values = law or (found, values)
@@ -269,7 +260,7 @@ def _found(
             standing, singles, runs.run_tasks, on_round, given_sse, may_cut=False
         )
         found = with_own_base(found, standing, runs.simulator)
-        law = _short_law(standing, options, simulation, found, on_round)
+        law = short_law(standing, options, simulation, found, on_round)
         if law is not None:
             return law
         some = runs.up_to(_FOR_SINGLES)
@@ -299,49 +290,6 @@ def _found(
     else:
         standing = _with_nearer_spring(standing, singles, runs, on_round)
     return _of_sets(standing, options, (runs, values), on_round, given_sse, alone)
-
-
-def _short_law(
-    standing: DiagnosisProblem,
-    options: DiagnoseOptions,
-    simulation: tuple[Runs, dict[str, float]],
-    found: Findings,
-    on_round: OnRound,
-) -> tuple[Findings, dict[str, float], bool] | None:
-    """A law of one term that is all that is missing, where no single effect may be.
-
-    Both are of the same stand-in: an effect of the catalogue that is missing would leave
-    as little beside it.
-
-    Parameters
-    ----------
-    found : Findings
-        Of single effects.
-    """
-    runs, values = simulation
-    fits = found.found.fits.values()
-    are_open = found.verdict.word not in ("none", "parameters")
-    if not (are_open and _may_be_law(options)) or runs.run_tasks.are_spent:
-        return None
-    if any(found.criteria.is_nearly_all(one, found.base) for one in fits):
-        return None
-    only = replace(options, laws="only")
-    law = find(standing, only, runs.run_tasks, on_round)
-    if law.law is None or len(law.law.terms) > 1:
-        return None
-    least = min(found.criteria.excess(one) for one in (found.base, *fits))
-    chosen, criteria = law.verdict.chosen, law.criteria
-    is_far_less = criteria.excess(chosen) <= _FAR_LESS * least
-    if not (is_far_less or criteria.is_complete(chosen)):
-        return None
-    on_round("the law in the simulation", 0)
-    told, moved, is_confirmed = confirm(law, runs, values)
-    return (told, moved, True) if is_confirmed and told.verdict.is_complete else None
-
-
-def _may_be_law(options: DiagnoseOptions) -> bool:
-    """Whether a law may take the place of what the catalogue holds."""
-    return options.laws == "auto" and options.effects is None
 
 
 def _is_exact(told: Findings | None) -> bool:
@@ -438,49 +386,6 @@ def _leaves_less(
 def _leaves_less_than(one: Findings, other: Findings) -> bool:
     """Whether what is chosen leaves less of all recordings than in other findings."""
     return bool(one.verdict.chosen.sse.sum() < other.verdict.chosen.sse.sum())
-
-
-def _law_instead(
-    runs: Runs,
-    problem: DiagnosisProblem,
-    verdict: DiagnosisVerdict,
-    values: dict[str, float],
-    options: DiagnoseOptions,
-    on_round: OnRound,
-) -> tuple[Findings, dict[str, float]] | None:
-    """A law as short as what is named that leaves far less, if there is one.
-
-    A stand-in that is late at a step may take what is left for its own error; only the
-    simulation's run with the effect shows it.
-
-    Parameters
-    ----------
-    verdict : DiagnosisVerdict
-        On the simulation's run.
-    values : dict of str to float
-        Parameters of the simulation that no effect has moved.
-    """
-    if options.max_runs is None:
-        runs = replace(runs, run_tasks=runs.run_tasks.at_least(_FOR_LAW))
-    if (
-        runs.run_tasks.are_spent
-        or not _may_be_law(options)
-        or verdict.word not in _NAMED
-        or verdict.is_complete
-    ):
-        return None
-    on_round("a law instead", 0)
-    standing = standing_beside(runs, problem, runs.of(problem.signals, values), values)
-    only = replace(options, laws="only")
-    found = find(standing, only, runs.run_tasks, on_round)
-    if found.law is None or len(found.law.terms) > len(verdict.chosen.effects):
-        return None
-    told, moved, is_confirmed = confirm(found, runs, values)
-    criteria, law = told.criteria, told.verdict.chosen
-    is_better = criteria.gain(law, verdict.chosen) >= LEAST_GAIN
-    least = MOST_OF_NAMED * criteria.excess(verdict.chosen)
-    is_clear = told.verdict.is_complete or criteria.excess(law) <= least
-    return (told, moved) if is_confirmed and is_better and is_clear else None
 
 
 def _with_nearer_spring(

@@ -65,7 +65,7 @@ def fit_beside(
     free: Mapping[str, FreeParameter],
     values: dict[str, float],
     rival: Mapping[str, float],
-    noise_rms: float = 0.0,
+    noise_rms: float,
 ) -> dict[str, float] | None:
     """The same, given up where a few evaluations leave more than something else does.
 

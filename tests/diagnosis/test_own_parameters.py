@@ -73,7 +73,7 @@ def test_a_search_that_hardly_leaves_less_ends():
 def test_a_search_beside_a_rival_is_given_up_early_or_goes_to_its_end(floor):
     valley = Valley(floor)
     values = {name: one.value for name, one in FREE.items()}
-    found = fit_beside(valley, signals(), FREE, values, {"one": 100.0})
+    found = fit_beside(valley, signals(), FREE, values, {"one": 100.0}, 0.0)
     if floor:
         assert found is None
         assert len(valley.asked) <= 4 * 3 + 1
@@ -109,3 +109,20 @@ def test_differences_go_from_a_thousandth_to_a_twentieth():
     assert difference_for(slope, 1e9) == pytest.approx(0.05)
     assert difference_for(0.0 * slope, 1.0) == pytest.approx(0.05)
     assert difference_for(np.inf * slope, 1.0) == DIFFERENCE
+
+
+def test_beside_a_rival_a_search_far_from_the_noise_ends_sooner():
+    values = {name: one.value for name, one in FREE.items()}
+
+    def searched(noise_rms):
+        valley = Valley(floor=1.0)
+        found = fit_beside(valley, signals(), FREE, values, {"one": 100.0}, noise_rms)
+        return found, len(valley.asked)
+
+    far, of_far = searched(0.0)
+    near, of_near = searched(10.0)
+    assert near == pytest.approx({"a": 1.0, "b": 1.0}, abs=1e-2)
+    assert of_far < of_near
+    # What is left is hardly more: the last steps took less than 1 % of it each.
+    left = 100 * (far["b"] - far["a"] ** 2) ** 2 + (1 - far["a"]) ** 2
+    assert left < 0.1
