@@ -13,8 +13,9 @@ from hwid_cli.diagnosis.effect_sets import with_effect
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.simulator import Runs
-from hwid_cli.diagnosis.single_effects import ToldByRuns, single_in_simulation
+from hwid_cli.diagnosis.single_effects import single_in_simulation
 from hwid_cli.diagnosis.tasks import OnRound
+from hwid_cli.diagnosis.told_by_runs import ToldByRuns
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import CandidateFit

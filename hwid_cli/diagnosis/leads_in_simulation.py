@@ -10,8 +10,8 @@ from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.selection import LEAST_GAIN, count, title_of, with_best_so_far
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
-from hwid_cli.diagnosis.single_effects import ToldByRuns, decided_by_runs
 from hwid_cli.diagnosis.tasks import OnRound
+from hwid_cli.diagnosis.told_by_runs import ToldByRuns, decided_by_runs
 from hwid_cli.diagnosis.turns import Turn, fit_of_run
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE

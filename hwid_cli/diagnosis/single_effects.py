@@ -5,23 +5,18 @@ error as well: sets of effects would be found that make up for it.
 docs/method_diagnosis.md, eq. (D33).
 """
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import fitted_effects
 from hwid_cli.diagnosis.findings import Findings
-from hwid_cli.diagnosis.intervals import unclear_effects
-from hwid_cli.diagnosis.own_base import is_beyond_factors, judged_by_own_base
-from hwid_cli.diagnosis.port_effects import (
-    PortStart,
-    begin_at_port,
-    moving_most,
-    port_effects,
-    with_port_effects,
+from hwid_cli.diagnosis.port_effects import begin_at_port
+from hwid_cli.diagnosis.port_search import (
+    at_ports_by_runs_alone,
+    at_ports_later,
+    through_runs_at_port,
 )
-from hwid_cli.diagnosis.port_screening import AtPorts, screened_at_ports
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED,
     LEAST_GAIN,
@@ -36,10 +31,10 @@ from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import acts_at_port, changes_input
 from hwid_cli.diagnosis.tasks import OnRound
 from hwid_cli.diagnosis.through_runs import MOST_LEFT, followed
+from hwid_cli.diagnosis.told_by_runs import ToldByRuns, TriedEffects, decided_by_runs
 from hwid_cli.diagnosis.turns import Turn, best_turn, fit_of_run
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
-from hwid_cli.drive.simulation import drive_effects
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE
 
@@ -53,43 +48,10 @@ _LEAST_LEFT = 0.01
 # of them leaves at most.
 _MOST_ON_INPUT = 3
 _CLEARLY_LESS = 0.5
-# Effects at its ports that the simulation's runs alone call likely: so many are fitted.
-# Those that leave more than three times the noise, this share of the gap, and so many
-# times what the stand-in says of another effect wait until that has been tried, [-].
-_MOST_BY_RUNS, _MOST_OF_GAP, _WORTH_WAITING = 2, 0.25, 2.0
 # A run that leaves little more than noise may turn on after the others have used up theirs.
 _TO_SETTLE = 1.5
 # Times the noise that a run leaves at most to be followed before others are tried.
 _NEARLY = 3.0
-# Mean square over the noise's beside which no further one is begun, unless runs have called
-# it likely by nearly the same share.
-_NEXT_TO_NOISE, _ALIKE = 2.0, 2.0
-# Squares over those that another effect's run leaves of the same recordings, from which on an
-# effect at a port is not fitted to the others.
-_FAR_BEHIND = 4.0
-
-
-@dataclass(frozen=True, eq=False)
-class ToldByRuns:
-    """What runs of the simulation with effects in it tell.
-
-    Parameters
-    ----------
-    findings : Findings or None
-        Of the run that decides; None where none may be named.
-    values : dict of str to float
-        Parameters of the simulation at that run; without one, at the best run of an effect
-        that explains most, which the parameters may have imitated.
-    is_all : bool
-        Whether that run leaves so little that a further effect could not be named.
-    fits : mapping of tuple of str to CandidateFit
-        What runs with single effects left.
-    """
-
-    findings: Findings | None
-    values: dict[str, float]
-    is_all: bool
-    fits: Mapping[tuple[str, ...], CandidateFit] = field(default_factory=dict)
 
 
 def single_in_simulation(
@@ -117,14 +79,14 @@ def single_in_simulation(
     alone = _base_in_simulation(findings, runs, values)
     if alone is not None:
         return ToldByRuns(*alone, is_all=True)
-    tried = _Tried(findings)
+    tried = TriedEffects(findings)
     likely = _likely(findings)
     criteria, base = findings.criteria, findings.base
     are_open = not any(criteria.is_nearly_all(one, base) for one in likely)
     if are_open and tried.ports_are_exact:
-        _at_ports_by_runs_alone(tried, runs, values, may_pair=may_pair)
+        at_ports_by_runs_alone(tried, runs, values, may_pair=may_pair)
     _try_likely(tried, likely, runs, values, on_round)
-    _at_ports_later(tried, runs)
+    at_ports_later(tried, runs)
     _follow(tried, runs, at_most=MOST_LEFT)
     tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
     decided = decided_by_runs(findings, tried.turns, tried.fits)
@@ -136,85 +98,8 @@ def single_in_simulation(
     return ToldByRuns(None, moved, is_all=False, fits=tried.fits)
 
 
-class _Tried:
-    """Best runs of the simulation with each effect, and what they left."""
-
-    def __init__(self, findings: Findings) -> None:
-        self.findings = findings
-        self.turns: dict[tuple[str, ...], Turn] = {}
-        self.fits: dict[tuple[str, ...], CandidateFit] = {}
-        # Effects at the ports that were fitted through runs, those begun that are hopeless,
-        # what was asked before, and which of them wait.
-        self.through_runs: set[tuple[str, ...]] = set()
-        self.given_up: set[tuple[str, ...]] = set()
-        self.at_ports = AtPorts()
-        self.later: list[PortStart] = []
-        # Mean square over the noise's that the best of those begun leaves.
-        self.least_begun = np.inf
-        # Whose runs were followed to their end.
-        self.followed: set[tuple[str, ...]] = set()
-
-    @property
-    def ports_are_exact(self) -> bool:
-        """Whether a run shows an effect at a port as it is.
-
-        The forces of an effect that is there already would have to go with its motion.
-        """
-        present = drive_effects(self.findings.problem.drive)
-        return not present or acts_at_port(tuple(present))
-
-    def is_known(self, one: CandidateFit) -> bool:
-        """Whether runs have said what an effect leaves, whatever a stand-in says.
-
-        It was fitted through runs or given up; or they leave nothing with another effect at
-        a port, and much with this one.
-        """
-        is_exact = one.effects in self.through_runs and one.effects in self.fits
-        if is_exact or one.effects in self.given_up:
-            return True
-        criteria, (effect,) = self.findings.criteria, one.effects
-        return any(
-            criteria.is_complete(fit) and self.at_ports.is_behind(effect, *fit.effects)
-            for fit in self.fits.values()
-            if len(fit.effects) == 1
-        )
-
-    def are_nearly_all(self, turns: Sequence[Turn] | None = None) -> bool:
-        """Whether one of some runs, or of all, leaves nothing that could be named."""
-        criteria, base = self.findings.criteria, self.findings.base
-        fits = list(self.fits.values())
-        if turns is not None:
-            fits = [fit_of_run(self.findings, turn) for turn in turns]
-        return any(criteria.is_nearly_all(fit, base) for fit in fits)
-
-    def is_hopeless(self, start: PortStart) -> bool:
-        """Whether a start leaves much, and another effect nothing or far less."""
-        if start.left <= STILL_LARGE**2:
-            return False
-        if self.are_nearly_all():
-            return True
-        of_runs = map(self._left_of_few, self.fits.values())
-        return start.left > _FAR_BEHIND * min([self.least_begun, *of_runs])
-
-    def _left_of_few(self, fit: CandidateFit) -> float:
-        """Mean square over the noise's of the recordings that starts are fitted to."""
-        problem, floors = self.findings.problem, self.findings.criteria.floors
-        few = {one.name for one in moving_most(problem.signals)}
-        rows = [n for n, one in enumerate(problem.signals) if one.name in few]
-        floor = float(floors[rows].sum())
-        return float(fit.sse[rows].sum()) / floor if floor > 0 else np.inf
-
-    def keep(self, turns: Sequence[Turn]) -> None:
-        """Keep runs that leave less than those before with the same effect."""
-        for turn in turns:
-            fit = fit_of_run(self.findings, turn)
-            before = self.fits.get(fit.effects)
-            if before is None or fit.sse.sum() < before.sse.sum():
-                self.turns[fit.effects], self.fits[fit.effects] = turn, fit
-
-
 def _try_likely(
-    tried: _Tried,
+    tried: TriedEffects,
     likely: Sequence[CandidateFit],
     runs: Runs,
     values: dict[str, float],
@@ -237,7 +122,7 @@ def _try_likely(
 
 
 def _in_simulation(
-    tried: _Tried, one: CandidateFit, runs: Runs, values: dict[str, float]
+    tried: TriedEffects, one: CandidateFit, runs: Runs, values: dict[str, float]
 ) -> list[Turn]:
     """Best runs with an effect: one at a port through runs first, which are exact."""
     findings, found = tried.findings, list[Turn]()
@@ -250,7 +135,7 @@ def _in_simulation(
         if start is not None and tried.is_hopeless(start):
             return []
         if start is not None:
-            found = _through_runs(tried, start, runs)
+            found = through_runs_at_port(tried, start, runs)
         if tried.are_nearly_all(found) or runs.run_tasks.are_spent:
             return found
     rival = min((fit.sse.sum() for fit in tried.fits.values()), default=np.inf)
@@ -258,7 +143,7 @@ def _in_simulation(
     return found if turn is None else [*found, turn]
 
 
-def _follow(tried: _Tried, runs: Runs, *, at_most: float) -> None:
+def _follow(tried: TriedEffects, runs: Runs, *, at_most: float) -> None:
     """Follow the run that leaves least to its end, once, where that is more than noise.
 
     Its turns may have ended before they had settled; what it leaves then makes a law look
@@ -312,142 +197,6 @@ def _twins_in_simulation(
             if twin.effects not in done:
                 found.append(settled(findings, twin, runs, turn.values_of_run))
     return [turn for turn in found if turn is not None]
-
-
-def _at_ports_by_runs_alone(
-    tried: _Tried, runs: Runs, values: dict[str, float], *, may_pair: bool
-) -> None:
-    """Effects at the ports that the simulation calls likely, whatever its stand-in says.
-
-    Those that leave much of a few recordings wait until others have been tried.
-    """
-    if runs.run_tasks.are_spent:
-        return
-    tried.at_ports = screened_at_ports(tried.findings, runs, values)
-    said = _least_said(tried.findings)
-    starts = _begun_at_ports(tried, tried.at_ports, runs)
-    tried.least_begun = min((one.left for one in starts), default=np.inf)
-    for start in starts:
-        if tried.are_nearly_all() or runs.run_tasks.are_spent:
-            break
-        if tried.is_hopeless(start):
-            tried.given_up.add(start.fit.effects)
-            continue
-        is_large = start.left > STILL_LARGE**2
-        waits = is_large and start.left > _WORTH_WAITING * said
-        if is_large and not waits and may_pair:
-            tried.keep(_pair_at_ports(tried, start, runs))
-            if tried.are_nearly_all():
-                break
-        if waits and start.share > _MOST_OF_GAP:
-            tried.later.append(start)
-        else:
-            tried.keep(_through_runs(tried, start, runs))
-    tried.keep(_with_wider_law(tried, runs))
-
-
-def _begun_at_ports(tried: _Tried, at_ports: AtPorts, runs: Runs) -> list[PortStart]:
-    """Likely effects fitted to a few recordings, those that leave least first."""
-    starts: list[PortStart] = []
-    likely = at_ports.likely[:_MOST_BY_RUNS]
-    for one in likely:
-        are_clear = any(start.left <= _NEXT_TO_NOISE for start in starts)
-        if runs.run_tasks.are_spent:
-            break
-        if are_clear and one.share > _ALIKE * likely[0].share:
-            break
-        begun = begin_at_port(tried.findings, one.fit, runs, one.values)
-        starts += [] if begun is None else [begun]
-    return sorted(starts, key=lambda one: one.left)
-
-
-def _least_said(findings: Findings) -> float:
-    """Mean square that the stand-in leaves at best of all recordings, over the noise's."""
-    squares = [float(one.sse.sum()) for one in findings.found.fits.values()
-               if one.is_usable]  # fmt: skip
-    floor = float(findings.criteria.floors.sum())
-    return min(squares, default=0.0) / floor if floor > 0 else 0.0
-
-
-def _pair_at_ports(tried: _Tried, first: PortStart, runs: Runs) -> list[Turn]:
-    """Best run with a second effect at a port, beside one that takes much and leaves much.
-
-    A dead zone and a delay are each small beside what the other one leaves.
-    """
-    findings = tried.findings
-    known = first.of_effects
-    screened = screened_at_ports(findings, runs, first.of_simulation, known)
-    found: list[Turn] = []
-    begun = _begun_at_ports(tried, screened, runs)
-    for start in begun:
-        is_clear = start.left <= _NEXT_TO_NOISE
-        is_behind = bool(found) and start.left > WITHIN_REACH * begun[0].left
-        is_spent = runs.run_tasks.are_spent and not is_clear
-        if start.left > _MOST_OF_GAP * first.left or is_behind or is_spent:
-            break
-        found += _through_runs(tried, start, runs)
-    if tried.are_nearly_all(found) and not runs.run_tasks.are_spent:
-        found += _second_alone(tried, begun[0], set(known), runs)
-    return found
-
-
-def _second_alone(
-    tried: _Tried, both: PortStart, first: Collection[str], runs: Runs
-) -> list[Turn]:
-    """Best run with the second effect of two alone, which may be all that is missing."""
-    (second,) = set(both.fit.effects) - set(first)
-    fit = port_effects(tried.findings, {second: both.of_effects[second]})
-    alone = begin_at_port(tried.findings, fit, runs, both.of_simulation)
-    if alone is None or alone.left > STILL_LARGE**2:
-        return []
-    return _through_runs(tried, alone, runs)
-
-
-def _at_ports_later(tried: _Tried, runs: Runs) -> None:
-    """Effects at the ports that have waited, where nothing else is all that is missing."""
-    for start in tried.later:
-        is_done = start.fit.effects in tried.through_runs
-        if is_done or runs.run_tasks.are_spent or tried.are_nearly_all():
-            continue
-        if not tried.is_hopeless(start):
-            tried.keep(_through_runs(tried, start, runs))
-
-
-def _with_wider_law(tried: _Tried, runs: Runs) -> list[Turn]:
-    """Run with a richer law of the effect that leaves least, if that is still too much.
-
-    A lag of first order leaves most of what one of second order has: without the latter
-    others that leave no less would be as likely.
-    """
-    findings = tried.findings
-    if tried.are_nearly_all() or runs.run_tasks.are_spent:
-        return []
-    turns = [one for one in tried.turns.values() if len(one.fit.effects) == 1]
-    if not turns:
-        return []
-    best = min(turns, key=lambda turn: float(turn.sse.sum()))
-    fit = fit_of_run(findings, best)
-    (effect,) = fit.effects
-    wider = (
-        one
-        for one, entry in CATALOGUE.items()
-        if effect in entry.contains and public_id(one) == public_id(effect)
-        if (one,) in findings.found.shares and acts_at_port((one,))
-    )
-    wide = next(wider, None)
-    if wide is None:
-        return []
-    values = CATALOGUE[wide].starts(findings.scales)[0] | fitted_effects(fit)[effect]
-    of_wide = port_effects(findings, {wide: values})
-    start = begin_at_port(findings, of_wide, runs, best.values_of_run)
-    return [] if start is None else _through_runs(tried, start, runs)
-
-
-def _through_runs(tried: _Tried, start: PortStart, runs: Runs) -> list[Turn]:
-    """Best run with an effect at a port, fitted through runs; none where it leaves more."""
-    tried.through_runs.add(start.fit.effects)
-    turn = with_port_effects(tried.findings, start, runs)
-    return [] if turn is None else [turn]
 
 
 def _twins(findings: Findings, fit: CandidateFit) -> list[CandidateFit]:
@@ -622,49 +371,3 @@ def _is_near(
     # Of what runs alone called likely, the stand-in may have said nothing.
     known = [excess(said[fit.effects]) for fit in done if fit.effects in said]
     return excess(one) <= WITHIN_REACH * min(known, default=0.0)
-
-
-def decided_by_runs(
-    findings: Findings,
-    tried: Mapping[tuple[str, ...], Turn],
-    fits: Mapping[tuple[str, ...], CandidateFit],
-) -> tuple[Findings, dict[str, float]] | None:
-    """The verdict by runs of the simulation, if effects of one of them may be named.
-
-    Parameters
-    ----------
-    tried : mapping of tuple of str to Turn
-        Best run with each effect, or set of effects.
-    fits : mapping of tuple of str to CandidateFit
-        What these runs left, and what the stand-in leaves with parts of the sets.
-
-    Returns
-    -------
-    Findings
-        With that verdict.
-    dict of str to float
-        Parameters of the simulation at that run.
-    """
-    criteria, rival = findings.criteria, findings
-    findings = judged_by_own_base(findings)
-    base, best = findings.base, list[CandidateFit]()
-    for size in sorted({len(one) for one in tried}):
-        same = [fits[one] for one in tried if len(one) == size]
-        one = select_best(criteria, same, base)
-        best += [] if one is None else [one]
-    if not best:
-        return None
-
-    def unclear(one: CandidateFit) -> tuple[str, ...]:
-        problem = replace(tried[one.effects].problem, known={})
-        return unclear_effects(problem, one, findings.scales)
-
-    verdict = decide(criteria, findings.given_sse, base, fits, best, unclear)
-    chosen = verdict.chosen
-    if chosen.effects not in tried or not is_beyond_factors(rival, chosen):
-        return None
-    turn = tried[verdict.chosen.effects]
-    found = replace(findings.found, fits={**findings.found.fits, **fits})
-    problem = replace(turn.problem, known={})
-    told = replace(findings, problem=problem, verdict=verdict, found=found)
-    return told, turn.values_of_run

@@ -1,6 +1,6 @@
 """Diagnosis of simulations that cannot be opened, against machines of their own making."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,13 +9,12 @@ from scipy.signal import lsim
 
 from hwid_cli import Recording
 from hwid_cli.diagnosis import foreign
+from hwid_cli.diagnosis.beside_stand_in import FoundBeside
 from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.run_starts import Begun, RunStarts
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
-from hwid_cli.diagnosis.single_effects import ToldByRuns
 from hwid_cli.diagnosis.standing import as_given, stand_in_for
 from hwid_cli.diagnosis.untold import Untold
-from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.simulation import NO_FORCE
 from hwid_cli.errors import SimulationError
 from hwid_cli.records.axis import MotionUnits
@@ -569,11 +568,12 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
 
     begun, results = [], iter(confirmed)
 
-    def found(standing, options, simulation, *_, **__):
-        _, values = simulation
-        begun.append(values["c"])
+    def found(beside, *, is_first):
+        assert is_first is (not begun)
+        begun.append(beside.values["c"])
         is_confirmed = next(results)
-        return stub(is_confirmed), {**values, "c": values["c"] + 1.0}, is_confirmed
+        moved = {**beside.values, "c": beside.values["c"] + 1.0}
+        return FoundBeside(stub(is_confirmed), moved, is_confirmed)
 
     @dataclass(frozen=True)
     class Told:
@@ -581,7 +581,7 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
         values: float
         confirmed: str = ""
 
-    monkeypatch.setattr(foreign, "_found", found)
+    monkeypatch.setattr(foreign, "searched_beside", found)
     monkeypatch.setattr(
         foreign,
         "fit_parameters",
@@ -600,128 +600,6 @@ def test_the_given_parameters_come_last_where_nothing_was_confirmed(
     is_confirmed, value = told
     assert seen.values == value
     assert seen.confirmed == ("simulation" if is_confirmed else "surrogate")
-
-
-@pytest.mark.parametrize("is_borne_out", [True, False])
-def test_pieces_are_asked_where_no_run_bears_a_single_effect_out(
-    monkeypatch, is_borne_out
-):
-    """What a stand-in leaves of an effect that runs bear out is its own error."""
-    asked = []
-
-    def find(_standing, options, *_, may_cut=True):
-        asked.append((options.max_effects, may_cut))
-        chosen = made_up((), 100.0, parameters=0)
-        verdict = SimpleNamespace(word="unknown", chosen=chosen)
-        return Some(verdict, Some(fits={}))
-
-    one = find(None, DiagnoseOptions()) if is_borne_out else None
-    asked.clear()
-    alone = ToldByRuns(one, {"c": 1.0}, is_all=False)
-    monkeypatch.setattr(foreign, "short_law", lambda *_: None)
-    monkeypatch.setattr(foreign, "find", find)
-    monkeypatch.setattr(foreign, "belongs_to", lambda *_: True)
-    monkeypatch.setattr(foreign, "with_further_effect", lambda first, *_: first)
-    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_, **__: alone)
-    monkeypatch.setattr(foreign, "with_own_base", lambda found, *_: found)
-    monkeypatch.setattr(
-        foreign, "confirm", lambda found, *_: (found, {"c": 1.0}, False)
-    )
-    monkeypatch.setattr(foreign, "leads_in_simulation", lambda *_: alone)
-    simulator = SimpleNamespace(run=simulate)
-    runs = Runs(simulator, CountedRuns(None))
-    foreign._found(
-        None, DiagnoseOptions(max_effects=3), (runs, {"c": 1.0}),
-        lambda *_: None, None, is_first=False,
-    )  # fmt: skip
-    assert asked == [(1, False), (3, not is_borne_out)]
-
-
-@pytest.mark.parametrize(
-    ("effect", "is_borne_out", "moved", "is_enough", "asks"),
-    [
-        # Parameters that have moved had imitated what is missing: the search begins again,
-        # unless runs bear an effect out and they have moved by little.
-        ("gear_backlash", False, 1.03, True, []),
-        ("gear_backlash", True, 1.03, True, ["further"]),
-        ("gear_backlash", True, 1.10, True, []),
-        ("gear_backlash", False, 1.001, True, ["further", "sets"]),
-        ("gear_backlash", True, 1.001, False, ["further", "sets"]),
-        # An effect at a port was fitted from everywhere: a second one is looked for first.
-        ("input_delay", True, 1.10, True, ["further"]),
-        ("input_delay", True, 1.10, False, ["further"]),
-    ],
-)
-def test_the_search_begins_again_where_parameters_have_moved(
-    monkeypatch, effect, is_borne_out, moved, is_enough, asks
-):
-    chosen = made_up((effect,), 100.0)
-    verdict = SimpleNamespace(word="unknown", chosen=chosen)
-    found = SimpleNamespace(verdict=verdict)
-    alone = ToldByRuns(found if is_borne_out else None, {"c": moved}, is_all=False)
-    asked = []
-    monkeypatch.setattr(foreign, "find", lambda *_, **__: found)
-    monkeypatch.setattr(foreign, "with_own_base", lambda one, *_: one)
-    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_, **__: alone)
-    monkeypatch.setattr(
-        foreign, "with_further_effect", lambda *_: asked.append("further") or alone
-    )
-    monkeypatch.setattr(foreign, "short_law", lambda *_: None)
-    monkeypatch.setattr(foreign, "_is_enough", lambda _: is_enough)
-    monkeypatch.setattr(
-        foreign,
-        "_of_sets",
-        lambda *_: asked.append("sets") or (found, {"c": moved}, is_borne_out),
-    )
-    monkeypatch.setattr(foreign, "_with_runs", lambda one, _: one)
-    monkeypatch.setattr(foreign, "unconfirmed", lambda one: one)
-    runs = Runs(SimpleNamespace(run=simulate), CountedRuns(None))
-    told, values, is_told = foreign._found(
-        None,
-        DiagnoseOptions(),
-        (runs, {"c": 1.0}),
-        lambda *_: None,
-        None,
-        is_first=True,
-    )
-    assert asked == asks
-    assert (told, values) == (found, {"c": moved})
-    assert is_told is is_borne_out
-
-
-@pytest.mark.parametrize(
-    ("effects", "is_confirmed", "is_found", "told"),
-    [
-        # A set that the simulation's run bears out needs no other one ...
-        (("end_stop", "gravity"), True, True, "set"),
-        # ... and where it bears none out, or none was named, its runs choose another ...
-        (("end_stop", "gravity"), False, True, "lead"),
-        ((), True, True, "lead"),
-        # ... if they can.
-        ((), True, False, "set"),
-    ],
-)
-def test_other_sets_are_run_where_none_is_confirmed(
-    monkeypatch, effects, is_confirmed, is_found, told
-):
-    def findings(name, effects):
-        verdict = SimpleNamespace(word=name, chosen=made_up(effects, 100.0))
-        return SimpleNamespace(verdict=verdict)
-
-    several, lead = findings("set", effects), findings("lead", ("end_stop", "hum"))
-    leads = ToldByRuns(lead if is_found else None, {"c": 2.0}, is_all=False)
-    monkeypatch.setattr(foreign, "find", lambda *_, **__: several)
-    monkeypatch.setattr(foreign, "with_own_base", lambda found, *_: found)
-    monkeypatch.setattr(foreign, "confirm", lambda *_: (several, {}, is_confirmed))
-    monkeypatch.setattr(foreign, "leads_in_simulation", lambda *_: leads)
-    runs = SimpleNamespace(run_tasks=None, simulator=None)
-    alone = ToldByRuns(None, {}, is_all=False)
-    found, values, borne_out = foreign._of_sets(
-        None, DiagnoseOptions(), (runs, {}), lambda *_: None, None, alone
-    )
-    assert found.verdict.word == told
-    assert values == ({"c": 2.0} if told == "lead" else {})
-    assert borne_out is (told == "lead" or is_confirmed)
 
 
 @pytest.mark.parametrize(
@@ -744,33 +622,6 @@ def test_a_search_that_its_runs_have_ended_says_so(count, is_complete, left, is_
     assert [("900 runs" in one, "max_runs: 1800" in one) for one in said] == (
         [(True, True)] if is_said else []
     )
-
-
-@pytest.mark.parametrize(("given", "most"), [(None, 1.5), (800, 1.0)])
-def test_sets_have_runs_beyond_those_of_single_effects_where_these_are_open(
-    monkeypatch, given, most
-):
-    seen = []
-    verdict = SimpleNamespace(word="unknown", chosen=made_up((), 100.0))
-    found = SimpleNamespace(verdict=verdict)
-    alone = ToldByRuns(None, {}, is_all=False)
-    monkeypatch.setattr(foreign, "short_law", lambda *_: None)
-    monkeypatch.setattr(foreign, "find", lambda *_, **__: found)
-    monkeypatch.setattr(foreign, "with_further_effect", lambda first, *_: first)
-    monkeypatch.setattr(foreign, "single_in_simulation", lambda *_, **__: alone)
-    monkeypatch.setattr(foreign, "with_own_base", lambda found, *_: found)
-    monkeypatch.setattr(foreign, "_with_runs", lambda one, *_: one)
-    monkeypatch.setattr(foreign, "_of_sets", lambda *a: seen.append(a[2][0]))
-    # All that may be left out are spent.
-    counted = CountedRuns(lambda *_, **__: [], 800)
-    counted.count = 900
-    runs = Runs(SimpleNamespace(run=simulate), counted)
-    foreign._found(
-        None, DiagnoseOptions(max_runs=given), (runs, {}), lambda *_: None, None,
-        is_first=False,
-    )  # fmt: skip
-    assert len(seen) == (most > 1.0)
-    assert all(not one.run_tasks.are_spent for one in seen)
 
 
 @pytest.mark.thorough
@@ -891,53 +742,6 @@ def test_after_the_runs_that_are_allowed_the_answer_is_the_best_until_then():
     # The effect that has begun is tried to its end; a second one is not looked for.
     assert counts[0] < counts[1]
     assert len(named[0]) < len(named[1]) == 2
-
-
-@pytest.mark.parametrize(
-    ("word", "starts_alike", "is_of_runs"),
-    [
-        ("unknown", True, True),
-        ("named", True, False),
-        # A run whose starts were found where others are known cannot be played again.
-        ("unknown", False, False),
-    ],
-)
-def test_leads_are_those_of_the_simulations_own_runs(
-    monkeypatch, word, starts_alike, is_of_runs
-):
-    monkeypatch.setattr(foreign, "where_it_starts", lambda problem, fit: fit)
-    monkeypatch.setattr(foreign, "belongs_to", lambda *_: starts_alike)
-    said = made_up(("cogging",), 10.0)
-    other = made_up(("coulomb_friction",), 50.0)
-    run = replace(said, sse=90.0 * said.sse)
-    found = replaced_findings(word, {said.effects: said, other.effects: other})
-    told = foreign._with_runs(
-        found, ToldByRuns(None, {}, is_all=False, fits={said.effects: run})
-    )
-    assert told.found.fits[said.effects] is (run if is_of_runs else said)
-    assert told.found.fits[other.effects] is other
-
-
-@dataclass(frozen=True)
-class Some:
-    """Findings, or what was found, as far as it is read here."""
-
-    verdict: object = None
-    found: object = None
-    fits: object = None
-    base: object = None
-    problem: object = None
-    scales: object = None
-    criteria: object = field(
-        default_factory=lambda: SimpleNamespace(leaves_next_to_nothing=lambda *_: False)
-    )
-
-
-def replaced_findings(word, fits):
-    return Some(
-        DiagnosisVerdict(word, is_complete=False, chosen=None, rivals=()),
-        Some(fits=fits),
-    )
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from hwid_cli.diagnosis import foreign, further_effects
 from hwid_cli.diagnosis.further_effects import with_further_effect
 from hwid_cli.diagnosis.simulator import Simulator
-from hwid_cli.diagnosis.single_effects import ToldByRuns
+from hwid_cli.diagnosis.told_by_runs import ToldByRuns
 from hwid_cli.records.candidates import ParameterRef
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import Capabilities

@@ -1,0 +1,182 @@
+"""Effects at the ports that a simulation's own runs choose, whatever its stand-in says.
+
+What acts on the input before the simulation, or on the output behind it, can be put into a
+run as it is: no stand-in is needed to say how much it explains.
+docs/method_diagnosis.md, eq. (D33).
+"""
+
+from collections.abc import Collection
+
+import numpy as np
+
+from hwid_cli.diagnosis.candidate import fitted_effects
+from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.port_effects import (
+    PortStart,
+    begin_at_port,
+    port_effects,
+    with_port_effects,
+)
+from hwid_cli.diagnosis.port_screening import AtPorts, screened_at_ports
+from hwid_cli.diagnosis.selection import WITHIN_REACH
+from hwid_cli.diagnosis.simulator import Runs
+from hwid_cli.diagnosis.stand_in import acts_at_port
+from hwid_cli.diagnosis.told_by_runs import TriedEffects
+from hwid_cli.diagnosis.turns import Turn, fit_of_run
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.records.diagnosis import STILL_LARGE
+
+# Effects at its ports that the simulation's runs alone call likely: so many are fitted.
+# Those that leave more than three times the noise, this share of the gap, and so many
+# times what the stand-in says of another effect wait until that has been tried, [-].
+_MOST_BY_RUNS, _MOST_OF_GAP, _WORTH_WAITING = 2, 0.25, 2.0
+# Mean square over the noise's beside which no further one is begun, unless runs have called
+# it likely by nearly the same share.
+_NEXT_TO_NOISE, _ALIKE = 2.0, 2.0
+
+
+def at_ports_by_runs_alone(
+    tried: TriedEffects, runs: Runs, values: dict[str, float], *, may_pair: bool
+) -> None:
+    """Try effects at the ports that the simulation calls likely, whatever its stand-in says.
+
+    Those that leave much of a few recordings wait until others have been tried.
+
+    Parameters
+    ----------
+    values : dict of str to float
+        Parameters of the simulation.
+    may_pair : bool
+        Whether two of them may be tried together.
+    """
+    if runs.run_tasks.are_spent:
+        return
+    tried.at_ports = screened_at_ports(tried.findings, runs, values)
+    said = _least_said(tried.findings)
+    starts = _begun_at_ports(tried, tried.at_ports, runs)
+    tried.least_begun = min((one.left for one in starts), default=np.inf)
+    for start in starts:
+        if tried.are_nearly_all() or runs.run_tasks.are_spent:
+            break
+        if tried.is_hopeless(start):
+            tried.given_up.add(start.fit.effects)
+            continue
+        is_large = start.left > STILL_LARGE**2
+        waits = is_large and start.left > _WORTH_WAITING * said
+        if is_large and not waits and may_pair:
+            tried.keep(_pair_at_ports(tried, start, runs))
+            if tried.are_nearly_all():
+                break
+        if waits and start.share > _MOST_OF_GAP:
+            tried.later.append(start)
+        else:
+            tried.keep(through_runs_at_port(tried, start, runs))
+    tried.keep(_with_wider_law(tried, runs))
+
+
+def at_ports_later(tried: TriedEffects, runs: Runs) -> None:
+    """Try effects at the ports that have waited, where nothing else is all that is missing."""
+    for start in tried.later:
+        is_done = start.fit.effects in tried.through_runs
+        if is_done or runs.run_tasks.are_spent or tried.are_nearly_all():
+            continue
+        if not tried.is_hopeless(start):
+            tried.keep(through_runs_at_port(tried, start, runs))
+
+
+def _begun_at_ports(
+    tried: TriedEffects, at_ports: AtPorts, runs: Runs
+) -> list[PortStart]:
+    """Likely effects fitted to a few recordings, those that leave least first."""
+    starts: list[PortStart] = []
+    likely = at_ports.likely[:_MOST_BY_RUNS]
+    for one in likely:
+        are_clear = any(start.left <= _NEXT_TO_NOISE for start in starts)
+        if runs.run_tasks.are_spent:
+            break
+        if are_clear and one.share > _ALIKE * likely[0].share:
+            break
+        begun = begin_at_port(tried.findings, one.fit, runs, one.values)
+        starts += [] if begun is None else [begun]
+    return sorted(starts, key=lambda one: one.left)
+
+
+def _least_said(findings: Findings) -> float:
+    """Mean square that the stand-in leaves at best of all recordings, over the noise's."""
+    squares = [float(one.sse.sum()) for one in findings.found.fits.values()
+               if one.is_usable]  # fmt: skip
+    floor = float(findings.criteria.floors.sum())
+    return min(squares, default=0.0) / floor if floor > 0 else 0.0
+
+
+def _pair_at_ports(tried: TriedEffects, first: PortStart, runs: Runs) -> list[Turn]:
+    """Best run with a second effect at a port, beside one that takes much and leaves much.
+
+    A dead zone and a delay are each small beside what the other one leaves.
+    """
+    findings = tried.findings
+    known = first.of_effects
+    screened = screened_at_ports(findings, runs, first.of_simulation, known)
+    found: list[Turn] = []
+    begun = _begun_at_ports(tried, screened, runs)
+    for start in begun:
+        is_clear = start.left <= _NEXT_TO_NOISE
+        is_behind = bool(found) and start.left > WITHIN_REACH * begun[0].left
+        is_spent = runs.run_tasks.are_spent and not is_clear
+        if start.left > _MOST_OF_GAP * first.left or is_behind or is_spent:
+            break
+        found += through_runs_at_port(tried, start, runs)
+    if tried.are_nearly_all(found) and not runs.run_tasks.are_spent:
+        found += _second_alone(tried, begun[0], set(known), runs)
+    return found
+
+
+def _second_alone(
+    tried: TriedEffects, both: PortStart, first: Collection[str], runs: Runs
+) -> list[Turn]:
+    """Best run with the second effect of two alone, which may be all that is missing."""
+    (second,) = set(both.fit.effects) - set(first)
+    fit = port_effects(tried.findings, {second: both.of_effects[second]})
+    alone = begin_at_port(tried.findings, fit, runs, both.of_simulation)
+    if alone is None or alone.left > STILL_LARGE**2:
+        return []
+    return through_runs_at_port(tried, alone, runs)
+
+
+def _with_wider_law(tried: TriedEffects, runs: Runs) -> list[Turn]:
+    """Run with a richer law of the effect that leaves least, if that is still too much.
+
+    A lag of first order leaves most of what one of second order has: without the latter
+    others that leave no less would be as likely.
+    """
+    findings = tried.findings
+    if tried.are_nearly_all() or runs.run_tasks.are_spent:
+        return []
+    turns = [one for one in tried.turns.values() if len(one.fit.effects) == 1]
+    if not turns:
+        return []
+    best = min(turns, key=lambda turn: float(turn.sse.sum()))
+    fit = fit_of_run(findings, best)
+    (effect,) = fit.effects
+    wider = (
+        one
+        for one, entry in CATALOGUE.items()
+        if effect in entry.contains and public_id(one) == public_id(effect)
+        if (one,) in findings.found.shares and acts_at_port((one,))
+    )
+    wide = next(wider, None)
+    if wide is None:
+        return []
+    values = CATALOGUE[wide].starts(findings.scales)[0] | fitted_effects(fit)[effect]
+    of_wide = port_effects(findings, {wide: values})
+    start = begin_at_port(findings, of_wide, runs, best.values_of_run)
+    return [] if start is None else through_runs_at_port(tried, start, runs)
+
+
+def through_runs_at_port(
+    tried: TriedEffects, start: PortStart, runs: Runs
+) -> list[Turn]:
+    """Best run with an effect at a port, fitted through runs; none where it leaves more."""
+    tried.through_runs.add(start.fit.effects)
+    turn = with_port_effects(tried.findings, start, runs)
+    return [] if turn is None else [turn]

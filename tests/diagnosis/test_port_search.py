@@ -1,0 +1,194 @@
+"""Which effects at the ports a simulation's own runs try."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hwid_cli.diagnosis import port_search, told_by_runs
+from hwid_cli.diagnosis.port_effects import PortStart
+from hwid_cli.diagnosis.port_screening import AtPorts, LikelyAtPort
+from hwid_cli.diagnosis.told_by_runs import TriedEffects
+from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.records.candidates import ParameterRef
+from tests.diagnosis.made_up_fits import CRITERIA, PROBLEM, base, made_up
+from tests.drive.drive_cases import SCALES
+
+
+def tried_at_ports(monkeypatch, lefts, sses, shares=()):
+    """What is fitted through runs, of effects that screening calls likely.
+
+    Parameters
+    ----------
+    lefts, sses : dict of str to float
+        What each leaves of few recordings, over the noise, and of all of them.
+    shares : sequence of str
+        Effects that were looked for.
+    """
+    findings = SimpleNamespace(
+        criteria=CRITERIA,
+        problem=PROBLEM,
+        base=base(900.0),
+        own_base=None,
+        scales=SCALES,
+        found=SimpleNamespace(shares={(one,): 0.1 for one in shares}, fits={}),
+    )
+    runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
+    likely = tuple(
+        LikelyAtPort(0.3, made_up((one,), 100.0), {}) for one in list(lefts)[:2]
+    )
+    fitted = []
+
+    def begin(_findings, one, _runs, values):
+        return PortStart(one, values, lefts[one.effects[0]], 0.5)
+
+    def fit(_findings, start, _runs):
+        (effect,) = start.fit.effects
+        fitted.append(effect)
+        white = 0.5 if sses[effect] <= 100.0 else 9.0
+        names = [one.name for one in CATALOGUE[effect].parameters]
+        run = made_up((effect,), sses[effect], parameters=len(names), whiteness=white)
+        owned = tuple(ParameterRef(effect, name) for name in names)
+        run = replace(run, names=(*run.names[:3], *owned))
+        return SimpleNamespace(fit=run, sse=run.sse, values_of_run={})
+
+    monkeypatch.setattr(
+        port_search, "screened_at_ports", lambda *_: AtPorts({}, likely)
+    )
+    monkeypatch.setattr(port_search, "begin_at_port", begin)
+    monkeypatch.setattr(port_search, "with_port_effects", fit)
+    for room in (port_search, told_by_runs):
+        monkeypatch.setattr(room, "fit_of_run", lambda _, turn: turn.fit)
+    tried = TriedEffects(findings)
+    port_search.at_ports_by_runs_alone(tried, runs, {}, may_pair=False)
+    first = list(fitted)
+    port_search.at_ports_later(tried, runs)
+    return first, fitted[len(first) :]
+
+
+def test_what_leaves_much_of_few_recordings_waits_until_others_have_been_tried(
+    monkeypatch,
+):
+    lefts = {"input_saturation": 30.0, "sensor_lag": 8.0}
+    sses = {"input_saturation": 500.0, "sensor_lag": 800.0}
+    found = tried_at_ports(monkeypatch, lefts, sses)
+    assert found == (["sensor_lag"], ["input_saturation"])
+    # Not at all where the first one leaves nothing, or far less of the same recordings.
+    sses = {"input_saturation": 500.0, "sensor_lag": 100.0}
+    assert tried_at_ports(monkeypatch, lefts, sses) == (["sensor_lag"], [])
+    sses = {"input_saturation": 500.0, "sensor_lag": 700.0}
+    assert tried_at_ports(monkeypatch, lefts, sses) == (["sensor_lag"], [])
+    lefts, sses["sensor_lag"] = {"input_saturation": 33.0, "sensor_lag": 8.0}, 800.0
+    assert tried_at_ports(monkeypatch, lefts, sses) == (["sensor_lag"], [])
+
+
+def test_the_richer_law_follows_where_the_plain_one_leaves_too_much(monkeypatch):
+    richer = "sensor_lag:second_order"
+    lefts = {"input_delay": 11.0, "sensor_lag": 3.0, richer: 1.0}
+    sses = {"input_delay": 500.0, "sensor_lag": 300.0, richer: 100.0}
+    found = tried_at_ports(monkeypatch, lefts, sses, shares=("sensor_lag", richer))
+    assert found == (["sensor_lag", richer], [])
+    # Only where it was asked for, and where something is left.
+    found = tried_at_ports(monkeypatch, lefts, sses, shares=("sensor_lag",))
+    assert found == (["sensor_lag"], ["input_delay"])
+    sses["sensor_lag"] = 100.0
+    found = tried_at_ports(monkeypatch, lefts, sses, shares=("sensor_lag", richer))
+    assert found == (["sensor_lag"], [])
+
+
+ZONE, DELAY = "input_dead_zone", "input_delay"
+
+
+@pytest.mark.parametrize(
+    ("said", "left_alone", "left_both", "left_of_second", "fitted"),
+    [
+        # A dead zone takes most and leaves much: with a delay beside it nothing is left ...
+        (60.0, 50.0, 1.0, 40.0, [(ZONE, DELAY)]),
+        # ... which may be all of it, alone ...
+        (60.0, 50.0, 1.0, 1.0, [(ZONE, DELAY), (DELAY,)]),
+        # ... or takes too little.
+        (60.0, 50.0, 30.0, 40.0, [(ZONE,)]),
+        # No second one where the first leaves nothing, or the stand-in knows a better one.
+        (60.0, 1.5, 1.0, 40.0, [(ZONE,)]),
+        (2.0, 50.0, 1.0, 40.0, []),
+    ],
+)
+def test_a_second_effect_at_a_port_is_tried_beside_the_first(
+    monkeypatch, said, left_alone, left_both, left_of_second, fitted
+):
+    lefts = {(ZONE,): left_alone, (ZONE, DELAY): left_both, (DELAY,): left_of_second}
+    values = {"gain": 2.0, f"{ZONE}/threshold_A": 1.0, f"{DELAY}/delay_s": 3.0}
+    stand_in = made_up(("gravity",), 100.0 * said)
+    findings = SimpleNamespace(
+        criteria=CRITERIA, problem=PROBLEM, base=base(1e4), own_base=None,
+        scales=SCALES,
+        found=SimpleNamespace(shares={}, fits={("gravity",): stand_in}),
+    )  # fmt: skip
+    runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
+    done, beside = [], []
+
+    def of(effects):
+        owned = [ParameterRef.of_text(one) for one in values if "/" in one]
+        owned = tuple(one for one in owned if one.owner in effects)
+        return replace(made_up(effects, 1.0), names=owned, values=np.ones(len(owned)))
+
+    def screened(_findings, _runs, own, known=None):
+        beside.append(known)
+        effects = (ZONE, DELAY) if known else (ZONE,)
+        return AtPorts({}, (LikelyAtPort(0.3, of(effects), own),))
+
+    def fit(_findings, start, _runs):
+        done.append(start.fit.effects)
+        sse = 100.0 * start.left
+        run = made_up(start.fit.effects, sse, whiteness=0.5 if sse <= 100.0 else 9.0)
+        return SimpleNamespace(fit=run, sse=run.sse, values_of_run={})
+
+    monkeypatch.setattr(port_search, "screened_at_ports", screened)
+    monkeypatch.setattr(port_search, "with_port_effects", fit)
+    for room in (port_search, told_by_runs):
+        monkeypatch.setattr(room, "fit_of_run", lambda _, turn: turn.fit)
+    monkeypatch.setattr(
+        port_search, "port_effects", lambda _findings, each: of(tuple(each))
+    )
+    monkeypatch.setattr(
+        port_search,
+        "begin_at_port",
+        lambda _f, one, _r, _v: PortStart(
+            of(one.effects), values, lefts[one.effects], 0.3
+        ),
+    )
+    tried = TriedEffects(findings)
+    port_search.at_ports_by_runs_alone(tried, runs, {"gain": 2.0}, may_pair=True)
+    assert done == fitted
+    known = {ZONE: {"threshold_A": 1.0}}
+    assert beside == [None, known] if left_alone > 9.0 and said > 25.0 else [None]
+    assert [one.fit.effects for one in tried.later] == ([] if fitted else [(ZONE,)])
+
+
+@pytest.mark.parametrize(
+    ("share", "begun"),
+    [
+        # One that leaves next to nothing is enough, unless another is as likely.
+        (0.9, ["input_delay"]),
+        (0.15, ["input_delay", "sensor_lag"]),
+    ],
+)
+def test_a_second_likely_effect_is_begun_beside_one_that_leaves_nothing(
+    monkeypatch, share, begun
+):
+    asked = []
+
+    def begin(_findings, one, _runs, values):
+        asked.append(one.effects[0])
+        return PortStart(one, values, 1.0, 0.1)
+
+    monkeypatch.setattr(port_search, "begin_at_port", begin)
+    likely = (
+        LikelyAtPort(0.1, made_up(("input_delay",), 1.0), {}),
+        LikelyAtPort(share, made_up(("sensor_lag",), 1.0), {}),
+    )
+    runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
+    tried = TriedEffects(SimpleNamespace())
+    port_search._begun_at_ports(tried, AtPorts({}, likely), runs)
+    assert asked == begun
