@@ -101,6 +101,10 @@ class FoundBeside:
         """Whether there are effects that the simulation's own run confirms."""
         return self.is_confirmed and bool(self.findings.verdict.chosen.effects)
 
+    def leaves_less_than(self, one: Findings) -> bool:
+        """Whether effects that its run confirms leave less than what is chosen elsewhere."""
+        return self.names_effects and _leaves_less_than(self.findings, one)
+
     def stays_beside(self, further: "FoundBeside") -> bool:
         """Whether a further search is no reason to give this one up."""
         if not self.is_confirmed:
@@ -227,10 +231,7 @@ def _of_sets(beside: Beside, alone: ToldByRuns | None) -> FoundBeside:
         leads = leads_in_simulation(found, runs, values, on_round)
         if leads.findings is not None:
             several = FoundBeside(leads.findings, leads.values, is_confirmed=True)
-    is_less = several.names_effects and (
-        one is None or _leaves_less_than(several.findings, one)
-    )
-    if one is None or is_less:
+    if one is None or several.leaves_less_than(one):
         return replace(several, findings=_with_runs(several.findings, alone))
     return FoundBeside(one, alone.values, is_confirmed=True)
 

@@ -22,7 +22,7 @@ from hwid_cli.records.experiment import DiagnoseOptions
 _FOR_LAW = 100
 # A law of one term that leaves nothing, or at most this share of what single effects leave
 # beside the stand-in, in squares over the noise, is put into the simulation before them, [-].
-_FAR_LESS = 0.1
+_CLEARLY_LESS = 0.5
 # Verdicts that a law may take the place of.
 _NAMED = ("named", "ambiguous")
 
@@ -56,8 +56,8 @@ def short_law(
         return None
     least = min(found.criteria.excess(one) for one in (found.base, *fits))
     chosen, criteria = law.verdict.chosen, law.criteria
-    is_far_less = criteria.excess(chosen) <= _FAR_LESS * least
-    if not (is_far_less or criteria.is_complete(chosen)):
+    is_clearly_less = criteria.excess(chosen) <= _CLEARLY_LESS * least
+    if not (is_clearly_less or criteria.is_complete(chosen)):
         return None
     on_round("the law in the simulation", 0)
     told, moved, is_confirmed = confirm(law, runs, values)

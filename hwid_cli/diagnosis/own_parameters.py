@@ -1,6 +1,7 @@
 """The parameters of a simulation of the user's own, fitted through its runs."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -29,11 +30,36 @@ _HARDLY_FALLS = 0.999
 _FINE, _COARSE = 1e-6, 0.01
 _FIRST_EVALUATIONS = 4
 _LAST_FEW, _STILL_FALLS = 3, 0.8
+# Where far more than the noise is left, to move a parameter by its size costs the square of
+# this share of it: what hardly depends on it is not to lead it far away. A search that ends
+# without is followed by one with it where that moves one by so much of its size, [-].
+_HOLD, _FAR = 0.03, 0.5
 # Recordings that they are fitted to.
 _MOST_FITTED = 6
 
+
+@dataclass(frozen=True)
+class _Squares:
+    """Squares that decide how far a search goes, [output unit squared].
+
+    Parameters
+    ----------
+    most : float
+        More than a rival leaves.
+    near : float
+        What leaves less is near the noise.
+    rough : float
+        What leaves more is worth no last digits.
+    """
+
+    most: float
+    near: float
+    rough: float
+
+
 # Runs on some recordings with some parameters; None where one gives no answer.
 Ask = Callable[[Sequence[Signals], Mapping[str, float]], list[SimulatorRun] | None]
+_Of = Callable[[np.ndarray], np.ndarray]
 
 
 def fit_parameters(
@@ -42,6 +68,8 @@ def fit_parameters(
     free: Mapping[str, FreeParameter],
     values: dict[str, float],
     noise_rms: float = 0.0,
+    *,
+    is_rough: bool = False,
 ) -> dict[str, float]:
     """Parameters fitted to training recordings within their bounds.
 
@@ -53,10 +81,13 @@ def fit_parameters(
         All of them, to begin with; they stay where no run is possible with them.
     noise_rms : float, [output unit]
         Of the recordings; near it a search goes on for less.
+    is_rough : bool
+        Whether what is left far from the noise is fitted again afterwards.
     """
     chosen = _chosen(signals)
     near = _near(chosen, noise_rms)
-    return _fitted(ask, chosen, free, values, np.inf, near) or values
+    squares = _Squares(np.inf, near, near if is_rough else np.inf)
+    return _fitted(ask, chosen, free, values, squares) or values
 
 
 def fit_beside(
@@ -76,7 +107,8 @@ def fit_beside(
     """
     chosen = _chosen(signals)
     most = sum(rival[one.name] for one in chosen)
-    return _fitted(ask, chosen, free, values, most, _near(chosen, noise_rms))
+    near = _near(chosen, noise_rms)
+    return _fitted(ask, chosen, free, values, _Squares(most, near, near))
 
 
 def _near(signals: Sequence[Signals], noise_rms: float) -> float:
@@ -96,44 +128,41 @@ def _fitted(
     signals: Sequence[Signals],
     free: Mapping[str, FreeParameter],
     values: dict[str, float],
-    most: float,
-    near: float,
+    squares: _Squares,
 ) -> dict[str, float] | None:
-    """Fitted parameters; None where runs fail or leave more than so much, [output unit^2].
-
-    Parameters
-    ----------
-    near : float, [output unit squared]
-        What leaves less than this is near the noise.
-    """
+    """Fitted parameters; None where runs fail or leave more than a rival."""
     gap = _Gap(ask, signals, free, values)
     start = np.clip(gap.coordinates(values), gap.low, gap.high)
     if not np.isfinite(gap.errors(start)).all():
         return None
     searches, falls = [_MOST_EVALUATIONS] * _MOST_SEARCHES, _STILL_FALLS
-    is_beside = bool(np.isfinite(most))
+    is_beside = bool(np.isfinite(squares.most))
     if is_beside:
         searches.insert(0, _FIRST_EVALUATIONS)
         falls = _HARDLY_FALLS
-    before = np.inf
+    before, is_held = np.inf, False
     for evaluations in searches:
-        is_coarse = is_beside and gap.least > near
+        is_coarse = gap.least > squares.rough
+        errors, slopes = gap.held(start) if is_held else (gap.errors, gap.slopes)
         found = scipy.optimize.least_squares(
-            gap.errors, start, gap.slopes, (gap.low, gap.high), x_scale=1.0,
+            errors, start, slopes, (gap.low, gap.high), x_scale=1.0,
             max_nfev=evaluations, ftol=_COARSE if is_coarse else _FINE, xtol=1e-5,
         )  # fmt: skip
         start = found.x
-        if 2.0 * found.cost > most:
+        if 2.0 * found.cost > squares.most:
             return None
-        if found.status > 0 and (gap.least > near or not is_coarse):
+        is_far = gap.least > squares.near
+        is_led_off = is_far and not is_held and gap.is_led_off(found)
+        is_over = found.status > 0 and (is_far or not is_coarse)
+        if is_over and not is_led_off:
             break
         is_first = evaluations == _FIRST_EVALUATIONS
         has_come = found.cost < (1.0 - _STILL_PROMISED) * before
-        may_follow = 2.0 * found.cost <= near and has_come
-        goes_on = is_first or gap.falls_by(falls)
+        may_follow = 2.0 * found.cost <= squares.near and has_come
+        goes_on = is_first or is_led_off or gap.falls_by(falls)
         if not (goes_on or (may_follow and _promises_more(found))):
             break
-        before = found.cost
+        before, is_held = found.cost, is_far
     return gap.at(start)
 
 
@@ -206,6 +235,7 @@ class _Gap:
     ) -> None:
         self._ask, self._signals, self._values = ask, signals, values
         self._sizes = {name: abs(one.value) or 1.0 for name, one in free.items()}
+        self._stated = self.coordinates({name: one.value for name, one in free.items()})
         limits = np.array([one.limits for one in free.values()]).reshape(-1, 2)
         self.low, self.high = limits.T / np.array(list(self._sizes.values()))
         self._size = sum(one.n_evaluated for one in signals)
@@ -243,6 +273,34 @@ class _Gap:
             left = self._asked[place] = self._left(coordinates)
             self._costs.append(float(left @ left))
         return self._asked[place]
+
+    def is_led_off(self, found: Any) -> bool:
+        """Whether a parameter is far from its stated value for next to nothing."""
+        left = float(np.linalg.norm(found.fun))
+        hold = _HOLD * left * np.eye(found.x.size)
+        stacked = np.vstack([found.jac, hold])
+        pull = np.concatenate(
+            [np.zeros_like(found.fun), hold @ (self._stated - found.x)]
+        )
+        back = np.linalg.lstsq(stacked, pull)[0]
+        return bool(np.max(np.abs(back), initial=0.0) > _FAR)
+
+    def held(self, start: np.ndarray) -> tuple[_Of, _Of]:
+        """Errors and their derivatives, with those of parameters that leave their values.
+
+        Parameters
+        ----------
+        start : ndarray, shape (n_free,), [-]
+            What the search leaves there tells how much that costs.
+        """
+        left = self.errors(start)
+        hold = _HOLD * float(np.linalg.norm(left)) * np.eye(start.size)
+
+        def errors(coordinates: np.ndarray) -> np.ndarray:
+            beside = hold @ (coordinates - self._stated)
+            return np.concatenate([self.errors(coordinates), beside])
+
+        return errors, lambda coordinates: np.vstack([self.slopes(coordinates), hold])
 
     def slopes(self, coordinates: np.ndarray) -> np.ndarray:
         """Derivatives of the errors, by differences."""

@@ -5,7 +5,7 @@ run as it is: no stand-in is needed to say how much it explains.
 docs/method_diagnosis.md, eq. (D33).
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -17,19 +17,23 @@ from hwid_cli.diagnosis.port_effects import (
     port_effects,
     with_port_effects,
 )
-from hwid_cli.diagnosis.port_screening import AtPorts, screened_at_ports
+from hwid_cli.diagnosis.port_screening import LikelyAtPort, screened_at_ports
 from hwid_cli.diagnosis.selection import WITHIN_REACH
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import acts_at_port
 from hwid_cli.diagnosis.told_by_runs import TriedEffects
 from hwid_cli.diagnosis.turns import Turn, fit_of_run
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import STILL_LARGE
 
 # Effects at its ports that the simulation's runs alone call likely: so many are fitted.
 # Those that leave more than three times the noise, this share of the gap, and so many
 # times what the stand-in says of another effect wait until that has been tried, [-].
 _MOST_BY_RUNS, _MOST_OF_GAP, _WORTH_WAITING = 2, 0.25, 2.0
+# So many times what the stand-in says, which the others wait for before they are fitted at
+# all: the parameters, which are fitted with an effect, take the rest of it, [-].
+_FAR_ABOVE = 8.0
 # Mean square over the noise's beside which no further one is begun, unless runs have called
 # it likely by nearly the same share.
 _NEXT_TO_NOISE, _ALIKE = 2.0, 2.0
@@ -53,7 +57,10 @@ def at_ports_by_runs_alone(
         return
     tried.at_ports = screened_at_ports(tried.findings, runs, values)
     said = _least_said(tried.findings)
-    starts = _begun_at_ports(tried, tried.at_ports, runs)
+    likely = tried.at_ports.likely[:_MOST_BY_RUNS]
+    tried.unbegun = [one for one in likely if _is_far_above(tried.findings, one, said)]
+    likely = tuple(one for one in likely if one not in tried.unbegun)
+    starts = _begun_at_ports(tried, likely, runs)
     tried.least_begun = min((one.left for one in starts), default=np.inf)
     for start in starts:
         if tried.are_nearly_all() or runs.run_tasks.are_spent:
@@ -77,19 +84,42 @@ def at_ports_by_runs_alone(
 def at_ports_later(tried: TriedEffects, runs: Runs) -> None:
     """Try effects at the ports that have waited, where nothing else is all that is missing."""
     for start in tried.later:
-        is_done = start.fit.effects in tried.through_runs
-        if is_done or runs.run_tasks.are_spent or tried.are_nearly_all():
-            continue
-        if not tried.is_hopeless(start):
+        if _may_still_be_all(tried, start.fit, runs) and not tried.is_hopeless(start):
             tried.keep(through_runs_at_port(tried, start, runs))
+    for one in tried.unbegun:
+        if not _may_still_be_all(tried, one.fit, runs):
+            continue
+        begun = begin_at_port(tried.findings, one.fit, runs, one.values)
+        if begun is not None and not tried.is_hopeless(begun):
+            tried.keep(through_runs_at_port(tried, begun, runs))
+
+
+def _may_still_be_all(tried: TriedEffects, fit: CandidateFit, runs: Runs) -> bool:
+    """Whether an effect was not fitted through runs yet, and nothing else is enough."""
+    is_done = fit.effects in tried.through_runs
+    return not (is_done or runs.run_tasks.are_spent or tried.are_nearly_all())
+
+
+def _is_far_above(findings: Findings, one: LikelyAtPort, said: float) -> bool:
+    """Whether an effect leaves much, and the stand-in says far less of another one.
+
+    Parameters
+    ----------
+    said : float, [-]
+        Mean square over the noise's.
+    """
+    floor = float(findings.criteria.floors.sum())
+    if floor <= 0.0 or one.share <= _MOST_OF_GAP:
+        return False
+    left = one.share * float(findings.base.sse.sum()) / floor
+    return left > max(STILL_LARGE**2, _FAR_ABOVE * said)
 
 
 def _begun_at_ports(
-    tried: TriedEffects, at_ports: AtPorts, runs: Runs
+    tried: TriedEffects, likely: Sequence[LikelyAtPort], runs: Runs
 ) -> list[PortStart]:
     """Likely effects fitted to a few recordings, those that leave least first."""
     starts: list[PortStart] = []
-    likely = at_ports.likely[:_MOST_BY_RUNS]
     for one in likely:
         are_clear = any(start.left <= _NEXT_TO_NOISE for start in starts)
         if runs.run_tasks.are_spent:
@@ -118,7 +148,7 @@ def _pair_at_ports(tried: TriedEffects, first: PortStart, runs: Runs) -> list[Tu
     known = first.of_effects
     screened = screened_at_ports(findings, runs, first.of_simulation, known)
     found: list[Turn] = []
-    begun = _begun_at_ports(tried, screened, runs)
+    begun = _begun_at_ports(tried, screened.likely[:_MOST_BY_RUNS], runs)
     for start in begun:
         is_clear = start.left <= _NEXT_TO_NOISE
         is_behind = bool(found) and start.left > WITHIN_REACH * begun[0].left

@@ -139,7 +139,10 @@ def _beside_effect(findings: Findings, turn: Turn, runs: Runs) -> Turn:
             runs, some, [forces[one.name] for one in signals], turn.at_force, values
         )
 
-    values = fit_parameters(ask, problem.signals, runs.simulator.free, turn.values)
+    values = fit_parameters(
+        ask, problem.signals, runs.simulator.free, turn.values,
+        findings.criteria.noise.rms, is_rough=True,
+    )  # fmt: skip
     there = begun_with(turn, runs, values, each)
     return replace(turn, problem=held(problem)) if there is None else there
 

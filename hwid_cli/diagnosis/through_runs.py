@@ -17,6 +17,7 @@ from hwid_cli.diagnosis.parameters import BASE, START
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.turns import Turn, answered, fit_of_run
 from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.diagnosis import STILL_LARGE
 
 # Times the noise that a run leaves at most to be followed, and the runs that this may take
 # even where others have used up theirs.
@@ -36,8 +37,9 @@ _FIRST_DIFFERENCE, _ALIKE = 3e-3, 3.0
 # A step has to promise so many squares of the noise, and this share of what is left
 # beyond it.
 _WORTH_A_STEP, _WORTH_A_SHARE = 1.0, 1e-2
-# What a step leaves of the squares for another one to follow whatever runs are left.
-_MUCH_LESS = 0.7
+# What a step leaves of the squares for another one to follow whatever runs are left, and,
+# where more than three times the noise is left, for another one to follow at all.
+_MUCH_LESS, _LESS = 0.7, 0.9
 # No value moves by more than this factor (its logarithm) in a step.
 _LONGEST = 0.3
 # After a step that leaves less, and after one that does not.
@@ -198,8 +200,17 @@ class _Search:
             if following is None:
                 break
             gains_much = following.sse < _MUCH_LESS * place.sse
+            creeps = following.sse > max(_LESS * place.sse, self._near)
             place = following
+            if creeps:
+                break
         return None if place is first else place
+
+    @property
+    def _near(self) -> float:
+        """Squares of the training recordings that are near the noise's."""
+        n = sum(one.n_evaluated for one in self._turn.problem.signals)
+        return n * (STILL_LARGE * self._findings.criteria.noise.rms) ** 2
 
     def _begin(self) -> _Place | None:
         own = [q for _, q in self._shared]

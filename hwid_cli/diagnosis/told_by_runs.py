@@ -12,7 +12,7 @@ from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.own_base import is_beyond_factors, judged_by_own_base
 from hwid_cli.diagnosis.port_effects import PortStart, moving_most
-from hwid_cli.diagnosis.port_screening import AtPorts
+from hwid_cli.diagnosis.port_screening import AtPorts, LikelyAtPort
 from hwid_cli.diagnosis.selection import select_best
 from hwid_cli.diagnosis.stand_in import acts_at_port
 from hwid_cli.diagnosis.turns import Turn, fit_of_run
@@ -57,11 +57,12 @@ class TriedEffects:
         self.turns: dict[tuple[str, ...], Turn] = {}
         self.fits: dict[tuple[str, ...], CandidateFit] = {}
         # Effects at the ports that were fitted through runs, those begun that are hopeless,
-        # what was asked before, and which of them wait.
+        # what was asked before, and which of them wait, begun or not.
         self.through_runs: set[tuple[str, ...]] = set()
         self.given_up: set[tuple[str, ...]] = set()
         self.at_ports = AtPorts()
         self.later: list[PortStart] = []
+        self.unbegun: list[LikelyAtPort] = []
         # Mean square over the noise's that the best of those begun leaves.
         self.least_begun = np.inf
         # Whose runs were followed to their end.

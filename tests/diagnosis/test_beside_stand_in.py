@@ -211,3 +211,21 @@ def replaced_findings(word, fits):
         DiagnosisVerdict(word, is_complete=False, chosen=None, rivals=()),
         Some(fits=fits),
     )
+
+
+@pytest.mark.parametrize(
+    ("effects", "sse", "is_confirmed", "is_less"),
+    [
+        (("cogging", "coulomb_friction"), 90.0, True, True),
+        (("cogging", "coulomb_friction"), 110.0, True, False),
+        (("cogging", "coulomb_friction"), 90.0, False, False),
+        ((), 90.0, True, False),
+    ],
+)
+def test_a_set_has_to_leave_less_than_one_effect(effects, sse, is_confirmed, is_less):
+    def told(fit):
+        return SimpleNamespace(verdict=SimpleNamespace(chosen=fit))
+
+    one = told(made_up(("coulomb_friction",), 100.0))
+    several = FoundBeside(told(made_up(effects, sse)), {}, is_confirmed)
+    assert several.leaves_less_than(one) is is_less

@@ -111,6 +111,8 @@ ZONE, DELAY = "input_dead_zone", "input_delay"
         (60.0, 50.0, 30.0, 40.0, [(ZONE,)]),
         # No second one where the first leaves nothing, or the stand-in knows a better one.
         (60.0, 1.5, 1.0, 40.0, [(ZONE,)]),
+        (4.0, 50.0, 1.0, 40.0, []),
+        # What leaves much from the start is not even begun beside a far better one.
         (2.0, 50.0, 1.0, 40.0, []),
     ],
 )
@@ -163,7 +165,13 @@ def test_a_second_effect_at_a_port_is_tried_beside_the_first(
     assert done == fitted
     known = {ZONE: {"threshold_A": 1.0}}
     assert beside == [None, known] if left_alone > 9.0 and said > 25.0 else [None]
-    assert [one.fit.effects for one in tried.later] == ([] if fitted else [(ZONE,)])
+    waiting = tried.later if said > 3.0 else tried.unbegun
+    assert [one.fit.effects for one in waiting] == ([] if fitted else [(ZONE,)])
+    assert len(tried.later) + len(tried.unbegun) == len(waiting)
+    if not fitted:
+        # Nothing else was all that is missing.
+        port_search.at_ports_later(tried, runs)
+        assert done == [(ZONE,)]
 
 
 @pytest.mark.parametrize(
@@ -190,5 +198,5 @@ def test_a_second_likely_effect_is_begun_beside_one_that_leaves_nothing(
     )
     runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
     tried = TriedEffects(SimpleNamespace())
-    port_search._begun_at_ports(tried, AtPorts({}, likely), runs)
+    port_search._begun_at_ports(tried, likely, runs)
     assert asked == begun

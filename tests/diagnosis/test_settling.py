@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis import settling
-from hwid_cli.diagnosis.foreign import _leaves_less
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.turns import Turn
 from tests.diagnosis.made_up_fits import base, made_up
@@ -96,21 +95,3 @@ def test_no_forces_pass_for_an_effect_where_the_stand_in_has_run_away(settle):
     args = {"free": 1.0, "beside_free": 1.0, "ran_away": True}
     assert settle(held=900.0, beside=950.0, **args)[0] == "held"
     assert settle(held=900.0, beside=120.0, **args)[0] == "beside held"
-
-
-@pytest.mark.parametrize(
-    ("effects", "sse", "is_confirmed", "is_less"),
-    [
-        (("cogging", FRICTION), 90.0, True, True),
-        (("cogging", FRICTION), 110.0, True, False),
-        (("cogging", FRICTION), 90.0, False, False),
-        ((), 90.0, True, False),
-    ],
-)
-def test_a_set_has_to_leave_less_than_one_effect(effects, sse, is_confirmed, is_less):
-    def told(fit):
-        return SimpleNamespace(verdict=SimpleNamespace(chosen=fit))
-
-    one = told(made_up((FRICTION,), 100.0))
-    several = told(made_up(effects, sse)), {}, is_confirmed
-    assert bool(_leaves_less(several, one)) is is_less

@@ -26,19 +26,20 @@ class Program:
     the last one was and what its values lead to, so that several are needed to agree.
     """
 
-    def __init__(self, apart, *, agrees_by=0.2, bend=0.0):
+    def __init__(self, apart, *, agrees_by=0.2, bend=0.0, gap=0.0):
         self.count = 0
         self.agrees_by, self.bend = agrees_by, bend
         rng = np.random.default_rng(3)
         self.both, other = rng.standard_normal((2, 200)) * 100 * NOISE
         self.apart = apart * other
+        self.gap = gap * NOISE * rng.standard_normal(200)
 
     def answered(self, _findings, turn, _runs):
         self.count += 1
         force = np.log(turn.fit.values[0] / TRUE_N)
         mass = (turn.values["mass"] - TRUE_KG) / 0.3
         along = force - mass + self.bend * (force + mass) ** 2
-        wanted = self.both * along + self.apart * (force + mass)
+        wanted = self.both * along + self.apart * (force + mass) + self.gap
         before = np.concatenate(turn.left)[: wanted.size] if turn.left else 0 * wanted
         now = wanted + self.agrees_by * (before - wanted)
         one = (now,) * len(turn.problem.signals)
@@ -97,6 +98,15 @@ def test_a_bent_valley_takes_more_steps(begun):
     found = fitted_through_runs(*begun(Program(0.1, bend=0.2)))
 
     assert found.fit.values[0] == pytest.approx(TRUE_N, rel=0.02)
+
+
+def test_beside_what_is_missing_no_valley_is_followed(begun):
+    """A wrong law took 590 runs to leave 54 times the noise in place of 60, in squares."""
+    near, far = (Program(0.1, bend=0.2, gap=gap) for gap in (1.0, 10.0))
+    for program in (near, far):
+        fitted_through_runs(*begun(program))
+
+    assert far.count < 0.8 * near.count
 
 
 def test_values_stay_within_their_bounds(begun):
