@@ -36,6 +36,8 @@ _WITH_PAGE = ("diagnose", "test")
 _WITHOUT_MODEL = ("diagnose", "calibrate", "next")
 # Of a diagnosis; the page has all.
 _MOST_WARNINGS = 2
+# The model to take, as export knows it, in place of a name that is longer than a line.
+BEST, _LONG_NAME = "best", 60
 # What follows a stage, unless its results say more.
 _NEXT = {
     "simulate": "run",
@@ -59,7 +61,7 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
     if session.is_quiet:
         return
     diagnosis = session.results.get("diagnose")
-    best = None if name in _WITHOUT_MODEL else _best(session)
+    best = None if name in _WITHOUT_MODEL else recommended(session)
     rows = []
     if best is not None:
         rows += [("best model", one) for one in best_model_sentences(best)]
@@ -82,8 +84,8 @@ def say_end(session: Session, name: str, files: Sequence[str] = ()) -> None:
     session.say(closing_text(f"\n{title}", rows, screen_width()))
 
 
-def _best(session: Session) -> BestModel | None:
-    """The model to take, beside the linear one."""
+def recommended(session: Session) -> BestModel | None:
+    """The model to take by what has run, beside the linear one."""
     experiment, results = session.experiment, session.results
     options = experiment.crossval or CrossvalOptions()
     best = best_model(
@@ -189,7 +191,8 @@ def _after_model(session: Session, best: BestModel) -> str:
             return command_line(session, "order")
         if session.experiment.next is not None and "next" not in results:
             return command_line(session, "next")
-    name = best.linear_name if best.is_linear_better else best.name
+    is_long = len(best.taken_name) > _LONG_NAME
+    name = BEST if is_long else best.taken_name
     return command_line(session, "export", "--model", name)
 
 

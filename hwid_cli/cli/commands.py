@@ -190,8 +190,8 @@ FORMATS = ("json", "mat", "c", "fmu", "python", "simulink", "modelica")
     "--model",
     metavar="NAME",
     help="The model: step_06/3/7, a group step_06+step_09/3/7, a published name "
-    "NLHW-Step-6-3-7-1, or 'simulation' for the physics simulation that 'hwid "
-    "diagnose' extended.",
+    "NLHW-Step-6-3-7-1, 'best' for the one that 'hwid run' says to take, or 'simulation' "
+    "for the physics simulation that 'hwid diagnose' extended.",
 )
 @click.option(
     "--diagnosis",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from hwid_cli.cli.closing import BEST, recommended
 from hwid_cli.cli.driver import result_of
 from hwid_cli.cli.linear_models import linear_model
 from hwid_cli.cli.options import Choices
@@ -120,6 +121,8 @@ def chosen_model(session: Session, asked: str, *, with_trust: bool = False) -> E
     ConfigError
         If there is no such model.
     """
+    if asked == BEST:
+        asked = _best_name(session)
     if asked == SIMULATION:
         return _simulation(session)
     if asked.startswith(LINEAR):
@@ -135,6 +138,22 @@ def chosen_model(session: Session, asked: str, *, with_trust: bool = False) -> E
     title = next(title for title, known in titles.items() if known == name)
     made_by = stage if "+" in name else "identify"
     return _exported(session, fit, (name, title), made_by, with_trust)
+
+
+def _best_name(session: Session) -> str:
+    """Name of the model to take by the stages that have run."""
+    for stage in ("identify", "crossval", "group", "test"):
+        path = session.out / results_file(stage)
+        if stage == "identify" or has_left_results(path, stage):
+            result_of(session, stage)
+    best = recommended(session)
+    if best is None or not best.is_usable:
+        raise ConfigError(
+            f"--model {BEST}: no model can be taken; expected one that holds on other "
+            "recordings; 'hwid run' says what may help, or give the name of a model"
+        )
+    session.note(f"best model: {best.taken_name}")
+    return best.taken_name
 
 
 def _exported(

@@ -3,6 +3,8 @@
 import re
 from hashlib import sha256
 
+from hwid_cli.files.stems import shortened_stem
+
 # Words that MATLAB and C keep for themselves are no danger: every name has a number.
 _NO_IDENTIFIER = re.compile(r"\W", re.ASCII)
 _NO_FILE_NAME = re.compile(r'[/\\:*?"<>|\x00-\x1f]')
@@ -20,7 +22,7 @@ def file_stem(name: str) -> str:
     >>> file_stem("step_06+step_09/3/7")
     'step_06+step_09_3_7'
     """
-    return _NO_FILE_NAME.sub("_", name)
+    return shortened_stem(_NO_FILE_NAME.sub("_", name))
 
 
 def identifier(name: str, *, is_taken: bool = False) -> str:

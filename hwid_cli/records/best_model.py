@@ -123,6 +123,11 @@ class BestModel:
         )
 
     @property
+    def taken_name(self) -> str:
+        """Name of the better of both."""
+        return self.linear_name if self.is_linear_better else self.name
+
+    @property
     def is_usable(self) -> bool:
         """Whether the better of both is no worse than the mean of these recordings."""
         fit = self.linear_fit_percent if self.is_linear_better else self.fit_percent

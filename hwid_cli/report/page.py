@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from hwid_cli.files.stems import shortened_stem
 from hwid_cli.records.report import ReportContents, StoredResults
 from hwid_cli.report.charts import Chart
 from hwid_cli.report.dots import Dots
@@ -273,7 +274,7 @@ def file_names(names: Iterable[str], endings: Sequence[str] = ("",)) -> dict[str
     found: dict[str, str] = {}
     taken: set[str] = set()
     for name in dict.fromkeys(names):
-        plain = re.sub(r"[^\w.+ -]", "_", name)
+        plain = shortened_stem(re.sub(r"[^\w.+ -]", "_", name))
         file, number = plain, 1
         while taken & (files := {f"{file}{end}".casefold() for end in endings}):
             number += 1

@@ -5,6 +5,7 @@ import pytest
 import yaml
 
 from hwid_cli import load_model
+from hwid_cli.cli import closing
 from hwid_cli.export.json_reader import read_exported
 from hwid_cli.store.results import read_fits
 
@@ -37,6 +38,24 @@ def test_the_model_is_that_of_the_results(after_run, hwid, out):
     assert about["config"]["name"] == "tiny"
     assert "hwid" in about["versions"]
     assert content["columns"]["input"] == "current_A"
+
+
+def test_the_model_to_take_is_exported_without_its_name(after_run, hwid, out):
+    said = hwid("run").stdout
+    (name,) = [line.split()[-1] for line in said.splitlines() if " --model " in line]
+    result = hwid("export", "--model", "best")
+
+    assert result.exit_code == 0, result.output
+    stem = name.replace("/", "_").replace(":", "_")
+    assert result.stdout == f"{out / 'models' / f'{stem}.json'}\n"
+    assert f"best model: {name}" in result.stderr
+
+
+def test_a_name_that_is_longer_than_a_line_is_not_asked_for(
+    monkeypatch, after_run, hwid
+):
+    monkeypatch.setattr(closing, "_LONG_NAME", 5)
+    assert hwid("run").stdout.rstrip().endswith("--model best")
 
 
 @pytest.mark.thorough
