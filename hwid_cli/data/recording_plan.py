@@ -18,6 +18,7 @@ from hwid_cli.files.small_files import read_small_file
 from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.experiment import Columns, RecordingsOptions
 from hwid_cli.records.next import PlannedInput
+from hwid_cli.records.units import behind
 
 # What each kind needs besides its name.
 KINDS = {
@@ -39,7 +40,7 @@ _LARGEST = 1e60
 
 
 def read_plan(
-    path: Path, options: RecordingsOptions, sample_time_s: float
+    path: Path, options: RecordingsOptions, sample_time_s: float, unit: str = ""
 ) -> tuple[PlannedInput, ...]:
     """Read a plan and make or read the input of every row.
 
@@ -49,6 +50,8 @@ def read_plan(
         Where a file has its input, and what it is multiplied by.
     sample_time_s : float, [s]
         Of the recordings; files of inputs must have it.
+    unit : str
+        Of the input, for words.
 
     Raises
     ------
@@ -72,7 +75,7 @@ def read_plan(
             values = _input_of(given, options)
             found.append(PlannedInput(name, values, f"the input of {row['file']}"))
         else:
-            found.append(_made(place, row, sample_time_s))
+            found.append(_made(place, row, sample_time_s, behind(unit)))
     return tuple(found)
 
 
@@ -150,7 +153,7 @@ def _input_of(path: Path, options: RecordingsOptions) -> np.ndarray:
     return np.asarray(means * options.input_scale)
 
 
-def _made(place: str, row: Mapping[str, str], step_s: float) -> PlannedInput:
+def _made(place: str, row: Mapping[str, str], step_s: float, unit: str) -> PlannedInput:
     """An input that a row describes."""
     kind = row["kind"]
     if kind not in KINDS:
@@ -172,14 +175,14 @@ def _made(place: str, row: Mapping[str, str], step_s: float) -> PlannedInput:
     rest = max(1, round(_REST * n))
     time = step_s * np.arange(n - rest)
     if kind == "step":
-        shape, words = np.ones(time.size), f"a step of {amplitude:g}"
+        shape, words = np.ones(time.size), f"a step of {amplitude:g}{unit}"
     else:
         low = given["frequency_Hz"]
         high = given.get("last_frequency_Hz", low)
         phase = 2 * np.pi * (low * time + (high - low) * time**2 / (2 * time[-1]))
         shape = np.sin(phase)
         span = f"at {low:g} Hz" if high == low else f"from {low:g} to {high:g} Hz"
-        words = f"a {kind} of {amplitude:g} {span}"
+        words = f"a {kind} of {amplitude:g}{unit} {span}"
     values = np.concatenate([np.zeros(rest), amplitude * shape])
     return PlannedInput(row["name"], values, words)
 

@@ -29,11 +29,14 @@ class PlannedInput:
     values : ndarray, shape (n_samples,), [input unit]
     words : str
         What it is, for people.
+    first_name : str
+        The name that it was given, where a recording of another input has that.
     """
 
     name: str
     values: np.ndarray
     words: str
+    first_name: str = ""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", frozen_vector(self.values, "values"))

@@ -237,7 +237,8 @@ def _for_coverage(given: ToChoose, _: Runner) -> _Choice:
         one = given.offered[place]
         reason = (
             f"visits {as_percent(by)} more of the amplitudes and frequencies on offer "
-            f"({as_percent(now)} to {as_percent(now + by)}), most of it {_where(before, tables[place])}"
+            f"({as_percent(now)} to {as_percent(now + by)}), most of it "
+            f"{_where(before, tables[place], edges, given)}"
         )
         proposals.append(_proposal(one, by, "share visited", reason))
         now, before = now + by, joined([before, tables[place]])
@@ -267,15 +268,27 @@ def _repeats_verdict(repeats: Repeats, best: str, enough: float) -> str:
     return f"the inputs are enough ({inputs}), but {repeats.words}; {proposed}"
 
 
-def _where(before: np.ndarray, more: np.ndarray) -> str:
-    """Where an input visits most that is new: how fast, and on which side."""
+def _where(
+    before: np.ndarray, more: np.ndarray, edges: np.ndarray, given: ToChoose
+) -> str:
+    """Where an input visits most that is new: how fast, and at which values.
+
+    Parameters
+    ----------
+    before, more : ndarray, shape (N_BANDS, n), [input unit]
+        What recordings visit, and the input.
+    edges : ndarray, shape (n + 1,), [input unit]
+    """
     largest = np.maximum(before, more).max(axis=1, keepdims=True)
     new = np.maximum(more - before, 0.0) / np.maximum(largest, 1e-300)
     band, cell = (int(at) for at in np.unravel_index(np.argmax(new), new.shape))
-    speed = ("fast", "medium-fast", "slow")[min(2, 3 * band // N_BANDS)]
-    third = 3 * cell // new.shape[1]
-    side = ("at low values", "around the middle", "at high values")[third]
-    return f"{speed} content {side}"
+    first = given.recordings[0]
+    # Octaves from half the sample rate down; the last band holds all that is slower.
+    highest_Hz = 0.5 / first.sample_time_s / 2.0**band
+    is_slowest = band == N_BANDS - 1
+    low = "below" if is_slowest else f"from {highest_Hz / 2.0:.2g} to"
+    at = in_words((edges[cell], edges[cell + 1]), first.input_unit)
+    return f"{low} {highest_Hz:.2g} Hz at {at}"
 
 
 def _verdict(count: int, best: str, enough: float) -> str:

@@ -6,6 +6,8 @@ docs/trust.md.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +19,16 @@ from hwid_cli.records.next import PlannedInput
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.units import behind
 from hwid_cli.stages.fit_seconds import counted
+from hwid_cli.stages.output_range import in_words
 from hwid_cli.trust.designs import LEAST_SAMPLES, designs
 from hwid_cli.trust.repeats import is_as_planned
 
+# Times the range of all recorded outputs that a range of the output is questioned beyond.
+_FAR_BEYOND = 20.0
 # Share of the largest input up to which inputs of the other sign are noise.
 _OTHER_SIDE = 0.02
+# Samples of a designed input: a duration in other units must not fill the memory.
+_MOST_SAMPLES = 500_000
 # Times the largest recorded input beyond which an offered one is questioned.
 _FAR_OUTSIDE = 3.0
 
@@ -31,6 +38,9 @@ def offered_inputs(
 ) -> tuple[PlannedInput, ...]:
     """Inputs of the plan, or designed within the limits.
 
+    One whose name a recording of another input has is on offer under a further name: the
+    limits may have changed since.
+
     Raises
     ------
     MeasurementError, ConfigError
@@ -39,10 +49,21 @@ def offered_inputs(
     options, first = next_options(experiment), recordings[0]
     if options.plan is not None:
         path = Path(experiment.source).parent / options.plan
-        return read_plan(path, _files(experiment), first.sample_time_s)
+        found = read_plan(
+            path, _files(experiment), first.sample_time_s, first.input_unit
+        )
+        return _under_own_names(found, recordings)
     limits = options.limits
     if limits is None:
         raise ValueError("a configuration without plan and limits is refused")
+    n_samples = limits.duration_s / first.sample_time_s
+    if n_samples > _MOST_SAMPLES:
+        most_s = _MOST_SAMPLES * first.sample_time_s
+        raise ConfigError(
+            f"{experiment.source}: next.limits.duration_s: found {limits.duration_s:g} s, "
+            f"{n_samples:.3g} samples; expected at most {most_s:g} s, {_MOST_SAMPLES} "
+            "samples; give it in seconds"
+        )
     found = designs(
         limits.amplitude,
         limits.rate,
@@ -60,7 +81,29 @@ def offered_inputs(
             "which no input fits; expected a twentieth of the amplitude to be reached "
             f"within the duration, and at least {least:g} s; raise rate or duration_s"
         )
-    return found
+    return _under_own_names(found, recordings)
+
+
+def _under_own_names(
+    plan: Sequence[PlannedInput], recordings: Sequence[Recording]
+) -> tuple[PlannedInput, ...]:
+    """The same, each under a name that no recording of another input has."""
+    known = {one.name: one.input for one in recordings}
+    taken = {one.name for one in plan}
+
+    def may_be(name: str, one: PlannedInput) -> bool:
+        return name not in known or is_as_planned(known[name], one.values)
+
+    found = []
+    for one in plan:
+        names = (f"{one.name}_{number}" for number in count(2))
+        name = one.name
+        while not (may_be(name, one) and (name == one.name or name not in taken)):
+            name = next(names)
+        first = one.name if name != one.name else ""
+        found.append(replace(one, name=name, first_name=first))
+        taken.add(name)
+    return tuple(found)
 
 
 def _usual_sign(recordings: Sequence[Recording]) -> int:
@@ -86,9 +129,9 @@ def odd_inputs(
         Of the configuration.
     """
     known = {one.name for one in recordings}
-    said = _other_inputs(recordings, plan)
-    if options.plan is not None:
-        said += _far_outside(recordings, [one for one in plan if one.name not in known])
+    said = _other_inputs(plan)
+    said += _far_outside(recordings, [one for one in plan if one.name not in known])
+    said += _wide_range(options, recordings)
     limits = options.limits
     if limits is None or limits.one_sided:
         return said
@@ -105,25 +148,21 @@ def odd_inputs(
     ]
 
 
-def _other_inputs(
-    recordings: Sequence[Recording], plan: Sequence[PlannedInput]
-) -> list[str]:
+def _other_inputs(plan: Sequence[PlannedInput]) -> list[str]:
     """Recordings that have the name of an offered input, and another input."""
-    planned = {one.name: one for one in plan}
     return [
-        f"{one.name}: its input is not what was to be played under this name "
-        f"({planned[one.name].words}); it counts as what was measured: record it again, "
-        "or give it another name"
-        for one in recordings
-        if one.name in planned
-        and not is_as_planned(one.input, planned[one.name].values)
+        f"{one.first_name}: its input is not what was to be played under this name "
+        f"({one.words}); it counts as what was measured, and what was to be played is "
+        f"{one.name} from now on"
+        for one in plan
+        if one.first_name
     ]
 
 
 def _far_outside(
     recordings: Sequence[Recording], offered: Sequence[PlannedInput]
 ) -> list[str]:
-    """That inputs of a plan are far larger than any that was recorded, if so."""
+    """That inputs are far larger than any that was recorded, if so."""
     largest = max(float(np.abs(one.input).max()) for one in recordings)
     sizes = {one.name: float(np.abs(one.values).max()) for one in offered}
     far = [name for name, size in sizes.items() if size > _FAR_OUTSIDE * largest]
@@ -134,9 +173,27 @@ def _far_outside(
         behind(recordings[0].input_unit),
     )
     return [
-        f"{counted(len(far), 'input')} of the plan are far larger than all recorded ones: "
-        f"{worst} reaches {sizes[worst]:g}{unit}, recordings {largest:g}{unit}; make sure "
+        f"{counted(len(far), 'input')} on offer {'is' if len(far) == 1 else 'are'} far "
+        f"larger than all recorded ones: {worst} reaches {sizes[worst]:g}{unit}, recordings {largest:g}{unit}; make sure "
         "that the machine bears it"
+    ]
+
+
+def _wide_range(options: NextOptions, recordings: Sequence[Recording]) -> list[str]:
+    """That a range of the output is so wide that it may be in another unit, if so."""
+    if options.output_range is None:
+        return []
+    lowest = min(float(one.output.min()) for one in recordings)
+    highest = max(float(one.output.max()) for one in recordings)
+    unit = recordings[0].output_unit
+    low, high = options.output_range
+    times = (high - low) / max(highest - lowest, 1e-300)
+    if times <= _FAR_BEYOND:
+        return []
+    return [
+        f"next.output_range: {in_words((low, high), unit)} is {times:.3g} times as wide as "
+        f"what the recordings reach ({in_words((lowest, highest), unit)}), and hardly "
+        "leaves anything out; make sure that it is in the unit of the output"
     ]
 
 

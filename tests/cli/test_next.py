@@ -262,7 +262,26 @@ def test_another_input_under_a_planned_name_is_said(bench):
 
     said = run(bench, LIMITS)
 
-    assert f"{row['name']}: its input is not what was to be played" in flat(said.stderr)
+    name = row["name"]
+    assert f"{name}: its input is not what was to be played" in flat(said.stderr)
+    # What was to be played stays on offer, under another name, until that is recorded.
+    (again,) = [one for one in proposals(bench) if one["name"].startswith(f"{name}_")]
+    assert again["input"] == row["input"]
+    measure(bench / "raw", again["name"], played(bench, again)[:, 1])
+    run(bench, LIMITS)
+    assert again["name"] not in [one["name"] for one in proposals(bench)]
+
+
+def test_inputs_of_other_limits_do_not_count_as_recorded(bench):
+    measure(bench / "raw", "step_100", 0.5 * (np.arange(N) > N // 20))
+    (bench / "plan.csv").write_text(
+        "name,kind,amplitude,duration_s\nstep_100,step,2,4\n"
+    )
+
+    said = run(bench, "next: {plan: plan.csv}\n")
+
+    assert "enough is known" not in flat(said.output)
+    assert [one["name"] for one in proposals(bench)] == ["step_100_2"]
 
 
 def test_inputs_far_beyond_what_was_recorded_are_questioned(bench):
@@ -271,6 +290,29 @@ def test_inputs_far_beyond_what_was_recorded_are_questioned(bench):
     said = run(bench, "next: {plan: plan.csv}\n")
 
     assert "big reaches 500 A, recordings 0.5 A" in flat(said.stderr)
+
+
+def test_limits_far_beyond_what_was_recorded_are_questioned(bench):
+    said = run(
+        bench, "next: {limits: {amplitude: 500.0, rate: 1.0e+5, duration_s: 4}}\n"
+    )
+
+    assert "inputs on offer are far larger than all recorded ones" in flat(said.stderr)
+
+
+def test_a_duration_in_milliseconds_is_refused_at_once(bench):
+    said = run(bench, "next: {limits: {amplitude: 4, rate: 400, duration_s: 100000}}\n")
+
+    assert said.exit_code == 1
+    assert "next.limits.duration_s: found 100000 s" in flat(said.stderr)
+    assert "give it in seconds" in flat(said.stderr)
+
+
+def test_a_range_in_another_unit_is_questioned(bench):
+    asked = LIMITS.replace("next: {", "next: {output_range: [-50000, 50000], ")
+    assert "hardly leaves anything out" in flat(
+        run(bench, f"identify:\n{asked}").stderr
+    )
 
 
 DIAGNOSIS = """name: bench
