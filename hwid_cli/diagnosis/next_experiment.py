@@ -31,6 +31,12 @@ from hwid_cli.records.units import behind
 
 # Verdicts after which another recording is of use.
 UNDECIDED = ("ambiguous", "unknown")
+# Reasons why no input is named.
+_DECIDED = "the recordings decide; no further one is needed"
+_LEFT = (
+    "the recordings decide between what was tried, and none of that is all that is missing: "
+    "motion of other kinds may show the rest"
+)
 # Samples of a proposed recording.
 _MOST_SAMPLES = 6000
 _PERIODS = 12
@@ -62,7 +68,7 @@ def propose(
         With an empty input where none is needed, or none would tell.
     """
     if verdict.word not in UNDECIDED:
-        return NextExperiment("", "the recordings decide; no further one is needed")
+        return NextExperiment("", _DECIDED if verdict.is_complete else _LEFT)
     # A run of the simulation may have known how recordings start where a fit had found it.
     pair = [
         one
@@ -76,6 +82,7 @@ def propose(
             "a slower and a faster motion along the same path",
             "friction, inertia and delay then weigh differently",
         )
+    names = " and ".join(map(title_of, pair))
     models = [FittedCandidate(*rebuilt(problem, one, scales)) for one in pair]
     best = best_separation(problem, models[0], models[1], scales)
     if not best.input:
@@ -83,11 +90,10 @@ def propose(
             "",
             "every input of the menu goes farther than these recordings; one that "
             "moves the drive forth and back may tell "
-            f"{_titles(pair)} apart",
+            f"{names} apart",
         )
     # The dash of a dimensionless output would be a minus behind a number.
     by = f"{best.rms:.2g}{behind(problem.unit)}"
-    names = _titles(pair)
     ratio = best.rms / max(criteria.noise.rms, 1e-300)
     least = least_separation(best.n_samples)
     if ratio < least:
@@ -102,14 +108,6 @@ def propose(
         f"{names} then differ by {by} ({times_the_noise(ratio, least, best.n_samples)}) "
         "after the parameters have been fitted again",
     )
-
-
-def _titles(pair: Sequence[CandidateFit]) -> str:
-    """Two candidates in words that tell them apart."""
-    titles = [title_of(one) for one in pair]
-    if titles[0] == titles[1]:
-        titles = [" with ".join(one.effects) for one in pair]
-    return " and ".join(titles)
 
 
 def least_separation(n_samples: int) -> float:

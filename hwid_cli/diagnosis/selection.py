@@ -674,8 +674,20 @@ def _excess_of_held_out(criteria: SelectionCriteria, found: CandidateFit) -> flo
 
 
 def title_of(found: CandidateFit) -> str:
-    """Public ids of a set of effects, in words."""
-    return " with ".join(public_id(one) for one in found.effects)
+    """Public ids of a set of effects, with which of its kinds each is, in words."""
+    return " with ".join(_title(one) for one in found.effects)
+
+
+def _title(identifier: str) -> str:
+    """Public id, with what only the catalogue tells apart.
+
+    Examples
+    --------
+    >>> _title("elastic_coupling:load"), _title("gravity")
+    ('elastic_coupling (load)', 'gravity')
+    """
+    name, _, kind = identifier.partition(":")
+    return f"{name} ({kind.replace('_', ' ')})" if kind else name
 
 
 def with_best_so_far(

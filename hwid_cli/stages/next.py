@@ -363,7 +363,7 @@ def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
         sentence = "no two candidates could be simulated; nothing is proposed"
         return _Choice(float(len(found.titles)), words, sentence, ())
     order = np.argsort(-found.ratios, kind="stable")[: given.options.number]
-    names = " and ".join(found.titles)
+    names = "; ".join(found.titles)
     sizes = [one.values.size for one in given.offered]
     least = [least_separation(size) for size in sizes]
     proposals = tuple(
@@ -371,7 +371,7 @@ def _for_diagnosis(given: ToChoose, runner: Runner) -> _Choice:
             given.offered[place],
             float(ratio),
             "times the noise",
-            f"makes {names} differ by at least "
+            f"makes these ({names}) differ by at least "
             f"{times_the_noise(ratio, least[place], sizes[place])} after their parameters "
             "have been fitted again",
         )
@@ -479,9 +479,13 @@ def _changed(given: ToChoose, choice: _Choice) -> str:
     asked = {one.name for one in before.proposals}
     words = ", ".join(f"{name}{' (proposed)' * (name in asked)}" for name in names)
     form = "{:g}".format if given.options.goal == "diagnosis" else as_percent
+    earlier = f"{form(_known_before(given, before))} before"
+    if before.known_words != choice.known_words:
+        # Of another model, or what had been decided then is open now.
+        earlier = f"{form(before.known)} {before.known_words} before"
     return (
-        f"new since the last proposal: {words}; {form(_known_before(given, before))} "
-        f"before, {form(choice.known)} now {choice.known_words}"
+        f"new since the last proposal: {words}; {earlier}, {form(choice.known)} now "
+        f"{choice.known_words}"
     )
 
 

@@ -130,18 +130,6 @@ def test_an_input_of_one_sign_keeps_it(rivals, sign, word):
     assert all(next_experiment._has_known_sign(one, motor) for one in inputs.values())
 
 
-def test_two_changes_of_parameters_are_told_apart_by_what_changes(rivals):
-    *_, fits = rivals
-    pair = [
-        replace(fits[0], effects=(f"parameter_change:{which}",))
-        for which in ("mass", "damping")
-    ]
-    assert next_experiment._titles(pair) == (
-        "parameter_change:mass and parameter_change:damping"
-    )
-    assert next_experiment._titles([fits[0], pair[0]]).endswith(" and parameter_change")
-
-
 def test_where_every_input_goes_too_far_that_is_said(rivals, monkeypatch):
     of, _, scales, fits = rivals
     monkeypatch.setattr(next_experiment, "_BEYOND_TRAVEL", 1e-6)
@@ -150,6 +138,17 @@ def test_where_every_input_goes_too_far_that_is_said(rivals, monkeypatch):
     found = propose(of, criteria, scales, verdict, fits)
     assert found.input == ""
     assert found.reason.startswith("every input of the menu goes farther")
+
+
+@pytest.mark.parametrize(
+    ("is_complete", "said"), [(True, "no further one is needed"), (False, "the rest")]
+)
+def test_nothing_is_needed_only_where_nothing_is_left(rivals, is_complete, said):
+    of, _, scales, fits = rivals
+    verdict = DiagnosisVerdict("named", is_complete, fits[0], ())
+    found = propose(of, SelectionCriteria.of(of, white()), scales, verdict, fits)
+    assert not found.input
+    assert found.reason.endswith(said)
 
 
 def test_a_rival_that_runs_away_separates_nothing(rivals):

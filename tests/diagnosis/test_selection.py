@@ -20,6 +20,7 @@ from hwid_cli.diagnosis.selection import (
     is_part_of,
     rivals,
     select_best,
+    title_of,
 )
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide, lead
 from hwid_cli.drive.catalogue import CATALOGUE
@@ -1122,3 +1123,11 @@ def test_a_curved_spring_and_a_stop_are_one_law_while_something_remains(spring, 
 )
 def test_little_is_near_the_noise_and_next_to_nothing_of_the_gap(left, of, is_little):
     assert CRITERIA.leaves_next_to_nothing(made_up(GOOD, left), base(of)) is is_little
+
+
+def test_two_changes_of_parameters_are_told_apart_by_what_changes():
+    pair = [
+        made_up((f"parameter_change:{which}",), 1.0) for which in ("mass", "damping")
+    ]
+    titles = ["parameter_change (mass)", "parameter_change (damping)"]
+    assert [title_of(one) for one in pair] == titles
