@@ -71,5 +71,6 @@ def predict_file(  # noqa: PLR0913 - one for each option of the command
         f"{out}: {predicted.size} samples of {card.name}; time in s, predicted in "
         f"{card.output_unit}\n{prediction_note(initial_state, exported.initial_state)}"
     )
-    if found is not None:
-        click.echo(band_note(found, card.output_unit))
+    trust = exported.trust
+    if found is not None and trust is not None:
+        click.echo(band_note(found, card.output_unit, trust.judged_on))

@@ -206,7 +206,9 @@ class Findings:
         """What is known of the errors on whole recordings, if these can be predicted."""
         if self.pieces is not None:
             return None, TrustOnTests()
-        return simulation_trust(self.problem, self.verdict.chosen, self.scales)
+        return simulation_trust(
+            self.problem, self.verdict.chosen, self.scales, self.criteria.noise.rms
+        )
 
 
 def describe(findings: Findings) -> Diagnosis:

@@ -28,7 +28,8 @@ from hwid_cli.diagnosis.parameters import (
 from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem
 from hwid_cli.drive.effect import Scales
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.trust import Inside, ModelTrust, ShownBand, TrustOnTests
+from hwid_cli.records.diagnosis import STILL_LARGE
+from hwid_cli.records.trust import Band, Inside, ModelTrust, ShownBand, TrustOnTests
 from hwid_cli.trust.band import ErrorTerms
 from hwid_cli.trust.judged import Judgement, calibrated, left_out_bands, trust_row
 from hwid_cli.trust.visited import inside, visited_by
@@ -43,7 +44,10 @@ _DIRECTION = 1e-14
 
 
 def simulation_trust(
-    problem: DiagnosisProblem, found: CandidateFit, scales: Scales
+    problem: DiagnosisProblem,
+    found: CandidateFit,
+    scales: Scales,
+    noise_rms: float,
 ) -> tuple[ModelTrust | None, TrustOnTests]:
     """What is known of a simulation's errors, and its bands on held-out recordings.
 
@@ -53,6 +57,8 @@ def simulation_trust(
         Training and held-out recordings.
     found : CandidateFit
         On all of them.
+    noise_rms : float, [output unit]
+        Of the recordings.
 
     Returns
     -------
@@ -86,7 +92,17 @@ def simulation_trust(
         _judgement(compared[row], trust, variance)
         for row, variance in zip(rows, variances, strict=True)
     ]
-    return calibrated(trust, judged), _on_held_out(problem, trust, judged)
+    is_off = _is_far_off(judged, noise_rms)
+    bands = left_out_bands(trust, judged, is_off=is_off)
+    return calibrated(trust, judged, is_off=is_off), _on_held_out(problem, bands)
+
+
+def _is_far_off(judged: Sequence[Judgement], noise_rms: float) -> bool:
+    """Whether held-out recordings show far more than noise."""
+    if not judged:
+        return False
+    errors = np.concatenate([one.errors for one in judged])
+    return float(np.sqrt(np.mean(errors**2))) > STILL_LARGE * noise_rms
 
 
 def _rms_of(train: Sequence[Compared]) -> float:
@@ -172,11 +188,11 @@ def _judgement(one: Compared, trust: ModelTrust, variance: np.ndarray) -> Judgem
 
 
 def _on_held_out(
-    problem: DiagnosisProblem, trust: ModelTrust, judged: Sequence[Judgement]
+    problem: DiagnosisProblem, bands: Sequence[tuple[Judgement, Band]]
 ) -> TrustOnTests:
     found = [
         (trust_row((NAME, one.name, problem.unit), one.measured, band), one, band)
-        for one, band in left_out_bands(trust, judged)
+        for one, band in bands
     ]
     if not found:
         return TrustOnTests()

@@ -6,11 +6,13 @@ import numpy as np
 
 from hwid_cli.records.trust import Band, RecordingTrust
 from hwid_cli.records.units import behind
-from hwid_cli.report.formats import number, share_text
+from hwid_cli.report.formats import listed, number, share_text
 from hwid_cli.report.table import Table, numbers, texts
 
 # Share of the samples beyond all values that were recorded from which that is told.
 _MUCH_BEYOND = 0.1
+# Recordings that a sentence names.
+_FEW = 3
 
 # What the columns of the tables say.
 COLUMNS = (
@@ -22,9 +24,20 @@ COLUMNS = (
 )
 
 
-def band_note(band: Band, unit: str) -> str:
-    """Say how wide a band is, and how much of the prediction rests on data."""
+def band_note(band: Band, unit: str, judged_on: Sequence[str]) -> str:
+    """Say how wide a band is, what tells that, and how much rests on data.
+
+    Parameters
+    ----------
+    judged_on : sequence of str
+        Recordings, or parts of one, that the fit was judged by.
+    """
     where = band.inside
+    told = "no recording beside the fit tells its width"
+    if judged_on:
+        verb = "tells" if len(judged_on) == 1 else "tell"
+        which = listed(judged_on, most=_FEW)
+        told = f"its width is what {which} {verb}, which the fit had not used"
     width = number(float(np.mean(band.upper - band.lower)))
     beyond = 1.0 - float(where.amplitude.mean())
     says_so = (
@@ -32,7 +45,7 @@ def band_note(band: Band, unit: str) -> str:
         "model had it is wider, but nobody has checked that it holds 90 % there"
     )
     return (
-        f"the band of 90 % is {width}{behind(unit)} wide on average; "
+        f"the band of 90 % is {width}{behind(unit)} wide on average; {told}; "
         f"{share_text(where.all.mean())} of the samples rest on data in every respect "
         f"(value {share_text(where.amplitude.mean())}, rate {share_text(where.rate.mean())}, frequency "
         f"{share_text(where.frequency.mean())}){says_so * (beyond >= _MUCH_BEYOND)}"

@@ -105,13 +105,18 @@ def model_trust(
     return calibrated(trust, found)
 
 
-def calibrated(trust: ModelTrust, found: Sequence[Judgement]) -> ModelTrust:
+def calibrated(
+    trust: ModelTrust, found: Sequence[Judgement], *, is_off: bool = False
+) -> ModelTrust:
     """The same with scatter, gain and scale that recordings beside the fit tell.
 
     Parameters
     ----------
     trust : ModelTrust
         Of the fit alone.
+    is_off : bool
+        Whether far more than noise is left: another input then meets what is missing in
+        another way, and one recording says little of it.
     """
     if not found:
         return replace(trust, scale=_UNKNOWN_SCALE)
@@ -124,13 +129,13 @@ def calibrated(trust: ModelTrust, found: Sequence[Judgement]) -> ModelTrust:
     )
     return replace(
         known,
-        scale=_scale([_scores(one, known) for one in found]),
+        scale=_scale([_scores(one, known) for one in found], is_off=is_off),
         judged_on=tuple(one.name for one in found),
     )
 
 
 def left_out_bands(
-    trust: ModelTrust, found: Sequence[Judgement]
+    trust: ModelTrust, found: Sequence[Judgement], *, is_off: bool = False
 ) -> list[tuple[Judgement, Band]]:
     """Band on each recording that judges, told by the others.
 
@@ -138,10 +143,13 @@ def left_out_bands(
     ----------
     trust : ModelTrust
         Of the fit alone.
+    is_off : bool
+        Whether far more than noise is left.
     """
     bands = []
     for one in found:
-        known = calibrated(trust, [other for other in found if other is not one])
+        others = [other for other in found if other is not one]
+        known = calibrated(trust, others, is_off=is_off)
         # A model may diverge on recordings of others.
         with np.errstate(over="ignore", invalid="ignore"):
             bands.append((one, band_of(known, one.terms, one.where)))
@@ -167,7 +175,7 @@ def _scores(one: Judgement, trust: ModelTrust) -> np.ndarray:
     return np.nan_to_num(scores, nan=_DIVERGED, posinf=_DIVERGED, neginf=-_DIVERGED)
 
 
-def _scale(scores: Sequence[np.ndarray]) -> float:
+def _scale(scores: Sequence[np.ndarray], *, is_off: bool) -> float:
     """Half width in standard deviations: Student's, for the number of errors."""
     squares = np.array([np.mean(one**2) for one in scores])
     number = sum(independent_errors(one) for one in scores)
@@ -175,6 +183,9 @@ def _scale(scores: Sequence[np.ndarray]) -> float:
         # Recordings that differ more than so many errors would are fewer errors.
         relative = np.var(squares / squares.mean(), ddof=1)
         number = min(number, 2.0 * squares.size / relative)
+    if is_off:
+        # As if their squares differed by as much as they are large on average.
+        number = min(number, 2.0 * squares.size)
     quantile = scipy.special.stdtrit(number, 0.5 + COVERAGE / 2.0)
     return max(float(quantile * np.sqrt(squares.mean())), _LEAST_SCALE)
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.signal import lfilter
 
 from hwid_cli.records.trust import Inside, ModelTrust
@@ -105,6 +106,20 @@ def test_nothing_that_judges_leaves_twice_the_noise():
     known = calibrated(trust(), [])
 
     assert (known.scale, known.scatter, known.judged_on) == (2.0, 0.0, ())
+
+
+@pytest.mark.parametrize(("count", "freedom"), [(1, 2.0), (3, 6.0)])
+def test_few_recordings_say_little_of_a_wrong_structure(count, freedom):
+    rng = np.random.default_rng(5)
+    found = [judgement(0.1 * rng.standard_normal(N)) for _ in range(count)]
+
+    of_noise, of_structure = (
+        calibrated(trust(), found, is_off=is_off).scale for is_off in (False, True)
+    )
+
+    # Two quantiles of Student's: of many errors, and of two for each recording.
+    ratio = stats.t.ppf(0.95, freedom) / stats.norm.ppf(0.95)
+    assert of_structure / of_noise == pytest.approx(ratio, rel=0.03)
 
 
 def test_a_recording_does_not_judge_its_own_band():
