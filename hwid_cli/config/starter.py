@@ -111,6 +111,7 @@ def starter_text(
         _fit_lines(proposal),
         _validation_lines(layout, proposal),
         _group_lines(proposal),
+        _next_lines(layout, proposal),
         _diagnose_lines(layout, proposal),
     ]
     # No name of a file or column may end its line: the rest of it would be a key.
@@ -410,6 +411,27 @@ def _group_lines(proposal: Proposal) -> list[str]:
         "# One model of all of them beside those of single ones: few recordings are worth most",
         "# together. Smaller groups take longer: keep: {top: 2}, max_level: 3 tries them.",
         "group: {max_level: 1, together: true}",
+    ]
+
+
+def _next_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
+    """Limits of what may be recorded next: what the recordings have reached."""
+    unit = _si_unit(layout.input) or "unit of the input"
+    lines = (
+        ("amplitude", proposal.largest_input, unit),
+        ("rate", proposal.fastest_input, f"{unit} per second"),
+        ("duration_s", proposal.longest_s, "s"),
+    )
+    return [
+        "# Which recording to take next? These limits are what the recordings have reached; put",
+        "# those that your machine bears, and remove the marks: 'hwid next' then proposes inputs.",
+        "# next:",
+        "#   goal: coverage   # or parameters, or diagnosis (with 'simulation' above)",
+        "#   limits:",
+        *(
+            f"#     {name}: {float(f'{value:.3g}'):g}   # {of}"
+            for name, value, of in lines
+        ),
     ]
 
 

@@ -148,6 +148,10 @@ class Proposal:
     initial_state : str
         How a diagnosis takes the recordings to start.
     sample_time_s : float, [s]
+    largest_input, fastest_input : float, [input unit] and [input unit / s]
+        Largest value and steepest slope of all recordings.
+    longest_s : float, [s]
+        Length of the longest one.
     names : tuple of str
         Of the recordings that can be used.
     problems : tuple of str
@@ -164,6 +168,9 @@ class Proposal:
     threshold: float
     threshold_reason: str
     sample_time_s: float
+    largest_input: float
+    fastest_input: float
+    longest_s: float
     exclude: tuple[str, ...] = ()
     parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
     identify: tuple[str, ...] = ()

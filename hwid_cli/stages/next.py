@@ -75,7 +75,7 @@ from hwid_cli.trust.content import content, joined, value_edges, visited_share
 from hwid_cli.trust.visited import N_BANDS
 
 NAME = "next"
-STAGE_VERSION = 6
+STAGE_VERSION = 7
 # Hidden effects that a reason names.
 _NAMED_EFFECTS = 3
 
@@ -263,7 +263,10 @@ def _repeats_verdict(repeats: Repeats, best: str, enough: float) -> str:
     """What to take once the inputs are enough."""
     inputs = f"{best}, less than {as_percent(enough, 1)}"
     if not repeats.proposals:
-        return f"enough is known: {inputs}; {repeats.words}"
+        return (
+            f"enough is known: {inputs}; {repeats.words}; how good a model of these "
+            "recordings is, 'hwid run' says"
+        )
     proposed = _are_proposed(len(repeats.proposals), "repeat")
     return f"the inputs are enough ({inputs}), but {repeats.words}; {proposed}"
 
@@ -286,9 +289,9 @@ def _where(
     # Octaves from half the sample rate down; the last band holds all that is slower.
     highest_Hz = 0.5 / first.sample_time_s / 2.0**band
     is_slowest = band == N_BANDS - 1
-    low = "below" if is_slowest else f"from {highest_Hz / 2.0:.2g} to"
+    low = "below" if is_slowest else f"from {highest_Hz / 2.0:.3g} to"
     at = in_words((edges[cell], edges[cell + 1]), first.input_unit)
-    return f"{low} {highest_Hz:.2g} Hz at {at}"
+    return f"{low} {highest_Hz:.3g} Hz at {at}"
 
 
 def _verdict(count: int, best: str, enough: float) -> str:

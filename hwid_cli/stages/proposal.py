@@ -3,7 +3,7 @@
 import glob
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -121,6 +121,9 @@ def propose(
         threshold=threshold,
         threshold_reason=_threshold_reason(threshold, swing, unit),
         sample_time_s=raws[0].sample_time_s,
+        largest_input=_largest(raw.input for raw in raws),
+        fastest_input=_largest(np.diff(raw.input) / raw.sample_time_s for raw in raws),
+        longest_s=max(raw.input.size * raw.sample_time_s for raw in raws),
         exclude=tuple(glob.escape(name) for name in excluded),
         parts=parts,
         identify=identify if held_out else (),
@@ -201,6 +204,11 @@ def _alike_in_families(kinds: dict[str, str]) -> dict[str, str]:
         if stem and len(family) > 2 and 2 * count > len(family):
             found |= dict.fromkeys(family, kind)
     return found
+
+
+def _largest(signals: Iterable[np.ndarray]) -> float:
+    """Largest magnitude of several signals."""
+    return max(float(np.nanmax(np.abs(one), initial=0.0)) for one in signals)
 
 
 def _kind_of_signal(values: np.ndarray) -> str:

@@ -130,6 +130,21 @@ def test_the_configuration_runs_at_once(folder, tmp_path, layout):
     assert (tmp_path / "results" / "report.html").is_file()
 
 
+def test_the_marks_before_next_have_only_to_be_taken_off(folder, tmp_path):
+    write_german_csv(folder)
+    mine = tmp_path / "mine.yaml"
+    invoke("init", folder, "--out", mine)
+    text = mine.read_text()
+    start = text.index("# next:")
+    end = text.index("\n\n", start)
+    mine.write_text(text[:start] + without_marks(text[start:end]) + text[end:])
+
+    said = invoke("next", mine, "--out", tmp_path / "results", "--jobs", "1")
+
+    assert said.exit_code == 0, said.output
+    assert (tmp_path / "results" / "next.csv").is_file()
+
+
 def test_an_existing_file_stays_unless_it_may_go(folder, tmp_path):
     write_english_csv(folder)
     out = tmp_path / "mine.yaml"
