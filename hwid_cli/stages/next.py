@@ -42,13 +42,14 @@ from hwid_cli.report.next import next_blocks
 from hwid_cli.report.table import Block
 from hwid_cli.stages.diagnose import ToDiagnose, answers, hidden, undecided
 from hwid_cli.stages.diagnose import choose as choose_diagnosis
-from hwid_cli.stages.fit_seconds import counted
+from hwid_cli.stages.fit_seconds import SECONDS_PER_SIMULATED_SAMPLE, counted
 from hwid_cli.stages.known_parameters import (
     known_of_parameters,
     left_of_errors,
     model_of,
 )
 from hwid_cli.stages.offered_inputs import next_options, odd_inputs, offered_inputs
+from hwid_cli.stages.order_grid import candidate_orders, grid_place
 from hwid_cli.stages.output_range import (
     Foresee,
     Reach,
@@ -76,6 +77,9 @@ from hwid_cli.trust.visited import N_BANDS
 
 NAME = "next"
 STAGE_VERSION = 7
+# Seconds for each sample of a table of what an input visits (measured, 1200 to 50 000
+# samples), and how often one is made of each input.
+_SECONDS_PER_TABLED_SAMPLE, _TABLES_OF_EACH = 4e-7, 4
 # Hidden effects that a reason names.
 _NAMED_EFFECTS = 3
 
@@ -89,6 +93,7 @@ class ToChoose:
     plan: tuple[PlannedInput, ...]
     tested: tuple[str, ...] = ()
     fit: Fit | None = None
+    model_name: str = ""
     diagnosed: ToDiagnose | None = None
     verdict: str = ""
     previous: NextRecordings | None = None
@@ -321,11 +326,11 @@ def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
     count = len(known)
     own = " + ".join(fit.identified_on)
     words = (
-        f"of the standard errors of the {count} parameters of {fit.name} that {own} alone "
+        f"of the standard errors of the {count} parameters of {given.model_name} that {own} alone "
         "leaves are left"
     )
     if not count:
-        sentence = f"the parameters of {fit.name} cannot be told ({trust.reason}); nothing is proposed"
+        sentence = f"the parameters of {given.model_name} cannot be told ({trust.reason}); nothing is proposed"
         return _Choice(0.0, words, sentence, ())
     found = chosen_by_gain(
         known,
@@ -342,7 +347,7 @@ def _for_parameters(given: ToChoose, _: Runner) -> _Choice:
         if shrink < given.options.enough:
             break
         reason = (
-            f"lets standard errors of the {count} parameters of {fit.name} shrink by "
+            f"lets standard errors of the {count} parameters of {given.model_name} shrink by "
             f"{as_percent(shrink)} on (geometric) average"
         )
         one = given.offered[place]
@@ -522,14 +527,18 @@ def _choose(context: Context) -> ToChoose:
     options = next_options(experiment)
     recordings = results["calibrate"].recordings
     is_diagnosis = options.goal == "diagnosis"
+    fit, name = None, ""
+    if _asks_model(options):
+        fit = _model(experiment, results["identify"], recordings)
+        nb, nk = grid_place(fit, experiment.orders.nk_role)
+        name = f"{fit.name}/{nb}/{nk}"
     return ToChoose(
         options,
         recordings,
         offered_inputs(experiment, recordings),
         kept_for_test(experiment),
-        _model(experiment, results["identify"], recordings)
-        if _asks_model(options)
-        else None,
+        fit,
+        name,
         choose_diagnosis(context) if is_diagnosis else None,
         results["diagnose"].verdict if is_diagnosis else "",
         read_previous(context.out),
@@ -597,7 +606,25 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         f"{counted(len(offered), 'input')} on offer, for {_goal(planning.experiment)}"
     )
     size = sum(8.0 * one.values.size for one in offered)
-    return (StagePlan(NAME, what, len(offered), None, nan, size),)
+    seconds = _seconds(planning, offered)
+    return (StagePlan(NAME, what, len(offered), None, seconds, size),)
+
+
+def _seconds(planning: Planning, offered: Sequence[PlannedInput]) -> float:
+    """How long a choice takes, [s]; NaN where candidates of a diagnosis tell it."""
+    experiment = planning.experiment
+    if _goal(experiment) == "diagnosis":
+        return nan
+    known = sum(one.n_samples for one in planning.recordings)
+    samples = known + sum(one.values.size for one in offered)
+    seconds = _TABLES_OF_EACH * _SECONDS_PER_TABLED_SAMPLE * samples
+    if _goal(experiment) == "parameters":
+        grid = candidate_orders(experiment.orders)
+        linear = max(one.nb + one.nf for _, _, one in grid)
+        # A place and a value of each corner of both maps.
+        n_parameters = linear + 4 * (experiment.fit.units + 1)
+        seconds += SECONDS_PER_SIMULATED_SAMPLE * n_parameters * samples
+    return seconds
 
 
 def _goal(experiment: Experiment) -> str:
