@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 
 from hwid_cli.errors import CacheError
@@ -70,7 +71,7 @@ def read_previous(out: Path) -> NextRecordings | None:
 def write_next_files(out: Path, found: NextRecordings) -> None:
     """Write ``next.csv``, ``next.json`` and an input ready to play for each proposal.
 
-    Inputs of earlier proposals are removed.
+    Inputs of earlier proposals for the same goal are removed.
 
     Parameters
     ----------
@@ -84,8 +85,10 @@ def write_next_files(out: Path, found: NextRecordings) -> None:
     """
     folder = out / _FOLDER
     files = {one.name: f"{_FOLDER}/{one.name}.csv" for one in found.proposals}
+    others = _files_of_others(out / "next.json", found.goal)
+    kept = {*files.values(), *chain.from_iterable(others.values())}
     for path in folder.glob("*.csv"):
-        if f"{_FOLDER}/{path.name}" not in files.values():
+        if f"{_FOLDER}/{path.name}" not in kept:
             path.unlink()
     for one in found.proposals:
         _write_input(out / files[one.name], one, found.sample_time_s)
@@ -121,8 +124,23 @@ def write_next_files(out: Path, found: NextRecordings) -> None:
         }
         for one in found.proposals
     ]
+    content["others"] = others
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
     replace_file(out / "next.json", f"{text}\n".encode())
+
+
+def _files_of_others(path: Path, goal: str) -> dict[str, list[str]]:
+    """Files that were proposed for other goals, by these, as the last ``next.json`` says."""
+    try:
+        before = json.loads(path.read_text(encoding="utf-8"))
+        found = {
+            str(of): list(map(str, names)) for of, names in before["others"].items()
+        }
+        found[str(before["goal"])] = [str(one["file"]) for one in before["proposals"]]
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        # None, or of another version: no file is of another goal then.
+        return {}
+    return {of: names for of, names in found.items() if of != goal and names}
 
 
 def _write_input(path: Path, one: ProposedRecording, sample_time_s: float) -> None:

@@ -255,6 +255,16 @@ def test_what_changed_counts_what_is_there_now(bench):
     assert "New since the last proposal" not in flat(again.output)
 
 
+def test_what_another_goal_has_proposed_stays_to_be_played(bench):
+    by_goal = {}
+    for goal in ("coverage", "parameters", "coverage"):
+        run(bench, f"identify:\n{LIMITS.replace('next: {', f'next: {{goal: {goal}, ')}")
+        by_goal[goal] = {one["file"] for one in proposals(bench)}
+        found = {f"next/{one.name}" for one in (bench / "out" / "next").glob("*.csv")}
+        assert found == set().union(*by_goal.values())
+    assert by_goal["coverage"] != by_goal["parameters"]
+
+
 def test_another_input_under_a_planned_name_is_said(bench):
     run(bench, LIMITS)
     row = proposals(bench)[0]
