@@ -418,9 +418,9 @@ def _next_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     """Limits of what may be recorded next: what the recordings have reached."""
     unit = _si_unit(layout.input) or "unit of the input"
     lines = (
-        ("amplitude", proposal.largest_input, unit),
-        ("rate", proposal.fastest_input, f"{unit} per second"),
-        ("duration_s", proposal.longest_s, "s"),
+        ("amplitude", proposal.reached.largest, unit),
+        ("rate", proposal.reached.fastest, f"{unit} per second"),
+        ("duration_s", proposal.reached.longest_s, "s"),
     )
     return [
         "# Which recording to take next? These limits are what the recordings have reached; put",

@@ -77,6 +77,7 @@ def force_in_newtons(
         if is_told:
             return in_newtons(drive, gain)
         by_forces, error = gain_beside_friction(one, push, there)
+        by_forces *= float(np.sign(drive.force_constant_N_per_A))
         if by_forces > 0 and error <= _MOST_MISSED:
             return in_newtons(drive, by_forces)
         if gain > 0 and first_guess is None:

@@ -55,6 +55,8 @@ _LEAST_CONSTANT = 0.01
 _STRAIGHT = 1e-3
 _CURVED = 0.5
 _PUSHES_BACK = 1.2
+# An input pushes back where that leaves at most this share of the balance.
+_AGAINST = 0.5
 # Friction is in a simulation where it leaves at most this share of what other drives do.
 _DRY = 0.2
 _ITERATIONS = 20
@@ -70,7 +72,8 @@ def fit_stand_in(
 ) -> StandIn:
     """Plain drive that moves most nearly as a simulation does.
 
-    Its force constant is 1: forces count in the unit of the input.
+    Its force constant is 1, or -1 where the output falls as the input rises, as a brake's
+    speed: forces count in the unit of the input.
 
     Parameters
     ----------
@@ -89,6 +92,27 @@ def fit_stand_in(
     ----------
     docs/method_diagnosis.md, eq. (D30) and (D30e).
     """
+    against = [replace(one, driven_by=-one.driven_by) for one in signals]
+    left, left_against = (
+        balance_along(of, runs, hold, is_curved=True).left for of in (signals, against)
+    )
+    if left_against < _AGAINST * left:
+        drive = _behind_lag(
+            against, runs, may_curve=may_curve, may_lag=may_lag, hold=hold
+        )
+        return replace(drive, force_constant_N_per_A=-drive.force_constant_N_per_A)
+    return _behind_lag(signals, runs, may_curve=may_curve, may_lag=may_lag, hold=hold)
+
+
+def _behind_lag(
+    signals: Sequence[Signals],
+    runs: Sequence[SimulatorRun],
+    *,
+    may_curve: bool,
+    may_lag: bool,
+    hold: str,
+) -> StandIn:
+    """The drive that an input pushes, behind a lag that this passes if there is one."""
     lag = lag_of_input(signals, runs, hold) if may_lag else 0.0
     if not lag:
         return _fitted(signals, runs, may_curve=may_curve, hold=hold)

@@ -123,6 +123,22 @@ class FolderLayout:
 
 
 @dataclass(frozen=True)
+class Reached:
+    """How far, fast and long the inputs of some recordings go.
+
+    Parameters
+    ----------
+    largest : float, [input unit]
+    fastest : float, [input unit/s]
+    longest_s : float, [s]
+    """
+
+    largest: float
+    fastest: float
+    longest_s: float
+
+
+@dataclass(frozen=True)
 class Proposal:
     """What is proposed to do with the recordings.
 
@@ -148,10 +164,8 @@ class Proposal:
     initial_state : str
         How a diagnosis takes the recordings to start.
     sample_time_s : float, [s]
-    largest_input, fastest_input : float, [input unit] and [input unit / s]
-        Largest value and steepest slope of all recordings.
-    longest_s : float, [s]
-        Length of the longest one.
+    reached : Reached
+        How far, fast and long the inputs go.
     names : tuple of str
         Of the recordings that can be used.
     problems : tuple of str
@@ -168,9 +182,7 @@ class Proposal:
     threshold: float
     threshold_reason: str
     sample_time_s: float
-    largest_input: float
-    fastest_input: float
-    longest_s: float
+    reached: Reached
     exclude: tuple[str, ...] = ()
     parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
     identify: tuple[str, ...] = ()

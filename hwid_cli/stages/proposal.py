@@ -3,7 +3,7 @@
 import glob
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
 from hwid_cli.errors import HwidError
 from hwid_cli.records.experiment import CalibrateOptions
 from hwid_cli.records.recordings import KINDS, CalibrationLog, RawRecording
-from hwid_cli.records.starter import Proposal
+from hwid_cli.records.starter import Proposal, Reached
 from hwid_cli.records.units import behind
 from hwid_cli.stages.calibrate import calibrate_all
 from hwid_cli.stages.proposed_starts import (
@@ -121,9 +121,7 @@ def propose(
         threshold=threshold,
         threshold_reason=_threshold_reason(threshold, swing, unit),
         sample_time_s=raws[0].sample_time_s,
-        largest_input=_largest(raw.input for raw in raws),
-        fastest_input=_largest(np.diff(raw.input) / raw.sample_time_s for raw in raws),
-        longest_s=max(raw.input.size * raw.sample_time_s for raw in raws),
+        reached=_reached(raws),
         exclude=tuple(glob.escape(name) for name in excluded),
         parts=parts,
         identify=identify if held_out else (),
@@ -206,9 +204,16 @@ def _alike_in_families(kinds: dict[str, str]) -> dict[str, str]:
     return found
 
 
-def _largest(signals: Iterable[np.ndarray]) -> float:
-    """Largest magnitude of several signals."""
-    return max(float(np.nanmax(np.abs(one), initial=0.0)) for one in signals)
+def _reached(raws: Sequence[RawRecording]) -> Reached:
+    """Largest value, steepest slope and length of the inputs."""
+    inputs = [raw.input for raw in raws]
+    slopes = [np.diff(raw.input) / raw.sample_time_s for raw in raws]
+    largest, fastest = (
+        max(float(np.nanmax(np.abs(one), initial=0.0)) for one in signals)
+        for signals in (inputs, slopes)
+    )
+    longest_s = max(raw.input.size * raw.sample_time_s for raw in raws)
+    return Reached(largest, fastest, longest_s)
 
 
 def _kind_of_signal(values: np.ndarray) -> str:
