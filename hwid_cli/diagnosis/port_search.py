@@ -37,6 +37,8 @@ _FAR_ABOVE = 8.0
 # Mean square over the noise's beside which no further one is begun, unless runs have called
 # it likely by nearly the same share.
 _NEXT_TO_NOISE, _ALIKE = 2.0, 2.0
+# Times what the first one of a pair leaves by itself, up to which another may be as well.
+_AS_LIKELY = 1.2
 
 
 def at_ports_by_runs_alone(
@@ -73,6 +75,9 @@ def at_ports_by_runs_alone(
         if is_large and not waits and may_pair:
             tried.keep(_pair_at_ports(tried, start, runs))
             if tried.are_nearly_all():
+                alike = [one for one in starts if one is not start
+                         and one.left <= _AS_LIKELY * start.left]  # fmt: skip
+                tried.keep(_alike_in_pairs(tried, start, alike, runs))
                 break
         if waits and start.share > _MOST_OF_GAP:
             tried.later.append(start)
@@ -158,6 +163,32 @@ def _pair_at_ports(tried: TriedEffects, first: PortStart, runs: Runs) -> list[Tu
         found += through_runs_at_port(tried, start, runs)
     if tried.are_nearly_all(found) and not runs.run_tasks.are_spent:
         found += _second_alone(tried, begun[0], set(known), runs)
+    return found
+
+
+def _alike_in_pairs(
+    tried: TriedEffects, first: PortStart, alike: Sequence[PortStart], runs: Runs
+) -> list[Turn]:
+    """Best runs of a pair that leaves nothing, with others in the place of its first one.
+
+    A lag before a simulation and one behind it leave the same of a few recordings while a
+    dead zone beside them is missing.
+    """
+    pairs = [turn for effects, turn in tried.turns.items() if len(effects) > 1]
+    best = min(pairs, key=lambda turn: float(turn.sse.sum()), default=None)
+    if best is None:
+        return []
+    (known,) = first.of_effects
+    values = fitted_effects(best.fit)
+    second = {one: values[one] for one in values if one != known}
+    found: list[Turn] = []
+    for other in alike:
+        if runs.run_tasks.are_spent or set(other.of_effects) & set(second):
+            continue
+        fit = port_effects(tried.findings, {**other.of_effects, **second})
+        begun = begin_at_port(tried.findings, fit, runs, best.values_of_run)
+        if begun is not None and begun.left <= STILL_LARGE**2:
+            found += through_runs_at_port(tried, begun, runs)
     return found
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from hwid_cli.diagnosis.base_fit import compared_as_given
 from hwid_cli.diagnosis.diagnose import held_out_of
 from hwid_cli.diagnosis.force_scale import force_in_newtons
-from hwid_cli.diagnosis.problem import DiagnosisProblem, prepare
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
 from hwid_cli.diagnosis.stand_in import (
@@ -29,6 +29,9 @@ from hwid_cli.records.drive import LINE, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
 from hwid_cli.records.programs import SimulatorRun
 from hwid_cli.records.recordings import Recording
+
+# Share of the largest speed below which a machine is at rest, [-].
+_AT_REST = 0.01
 
 
 def its_own(simulator: Simulator) -> SimulationOptions:
@@ -146,6 +149,14 @@ def _standing(
     )
 
 
+def _runs(signals: Signals) -> bool:
+    """Whether what is seen is the speed of a machine that runs when a recording begins."""
+    if not signals.is_velocity or signals.own_start is None:
+        return False
+    speed = abs(signals.own_start[1])
+    return speed > _AT_REST * float(np.max(np.abs(signals.compared)))
+
+
 def _with_stand_in(
     problem: DiagnosisProblem, drive: StandIn, given: Sequence[SimulatorRun]
 ) -> DiagnosisProblem:
@@ -155,7 +166,7 @@ def _with_stand_in(
         moved = moved_as(one, found)
         force = force_beside(plain, one, moved)
         signals.append(standing_for(one, found, plain, force))
-        jumps.append(starts_with_a_jump(plain, one, force, moved))
+        jumps.append(starts_with_a_jump(plain, one, force, moved) or _runs(signals[-1]))
     if any(jumps):
         # Starts are known of all recordings, or of none.
         signals = [replace(one, start=one.own_start) for one in signals]
