@@ -229,7 +229,7 @@ def _told(
         warnings = (*warnings, _BESIDE_PARAMETERS)
     said = (
         starts_sentence(begun.starts.above, begun.problem.unit),
-        _lag_sentence(findings),
+        _lag_sentence(findings, can_run=simulator.run is not None),
     )
     warnings = (*warnings, *filter(None, said))
     return replace(
@@ -242,16 +242,21 @@ def _told(
     )
 
 
-def _lag_sentence(findings: Findings) -> str:
+def _lag_sentence(findings: Findings, *, can_run: bool) -> str:
     """Say that effects act behind a lag of the input; empty where none does."""
     effects = findings.verdict.chosen.effects
     lag = lag_before(findings.problem.drive, effects)
     if not lag or not effects or not act_as_forces(effects):
         return ""
-    return (
+    said = (
         f"the simulation's input passes a lag of {lag:.3g} s before it acts as a force; "
-        "what is missing acts behind it, and comes through the input ahead by as much (an "
-        "input for forces, simulation.force_input, shows more)"
+        "what is missing acts behind it"
+    )
+    if not can_run:
+        return said
+    return (
+        f"{said}, and comes through the input ahead by as much (an input for forces, "
+        "simulation.force_input, shows more)"
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from hwid_cli.diagnosis.base_fit import compared_as_given
 from hwid_cli.diagnosis.diagnose import held_out_of
 from hwid_cli.diagnosis.force_scale import force_in_newtons
+from hwid_cli.diagnosis.input_lag import inputs_behind
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, prepare
 from hwid_cli.diagnosis.run_starts import Begun, begin
 from hwid_cli.diagnosis.simulator import CountedRuns, Runs, Simulator
@@ -122,8 +123,13 @@ def standing_beside(
     standing = replace(standing, drive=with_change(drive, simulator.change))
     if simulator.run is not None:
         return standing
-    error = error_of(drive, problem.signals, given)
-    return replace(standing, stand_in_error=error)
+    # What a lag of the input does is known, and no error of the drive behind it.
+    behind = (
+        inputs_behind(problem.signals, drive.lag_s, drive.hold)
+        if drive.lag_s
+        else problem.signals
+    )
+    return replace(standing, stand_in_error=error_of(drive, behind, given))
 
 
 def _standing(
@@ -135,7 +141,7 @@ def _standing(
 ) -> StandIn:
     """The stand-in, with where laws count from."""
     simulator = runs.simulator
-    comes_through_input = simulator.run is not None and not simulator.capabilities.force
+    comes_through_input = not simulator.capabilities.force
     return replace(
         fit_stand_in(
             problem.signals,

@@ -759,4 +759,6 @@ def test_a_lag_that_effects_act_behind_is_said(lag_s, effects, is_said):
         problem=SimpleNamespace(drive=StandIn(lag_s=lag_s)),
         verdict=SimpleNamespace(chosen=SimpleNamespace(effects=effects)),
     )
-    assert ("a lag of 0.03 s" in foreign._lag_sentence(findings)) == is_said
+    assert (
+        "a lag of 0.03 s" in foreign._lag_sentence(findings, can_run=True)
+    ) == is_said

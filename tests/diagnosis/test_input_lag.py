@@ -5,11 +5,15 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import lsim
 
+from hwid_cli import Recording
+from hwid_cli.diagnosis.foreign import diagnose_foreign
 from hwid_cli.diagnosis.input_lag import behind_lag, through_input
 from hwid_cli.diagnosis.problem import Signals
+from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.diagnosis.stand_in_fit import fit_stand_in
 from hwid_cli.records.drive import HELD, LINE
-from hwid_cli.records.programs import SimulatorRun
+from hwid_cli.records.experiment import DiagnoseOptions
+from hwid_cli.records.programs import Capabilities, SimulatorRun
 
 STEP_S, N, LAG_S = 1e-3, 1500, 0.012
 TIME = STEP_S * np.arange(N)
@@ -116,3 +120,50 @@ def test_a_force_through_the_input_does_what_it_does_behind_the_lag(is_held):
     # Late by the lag, and half as early as it has to be.
     assert left(0.0) > 0.2
     assert left(0.5 * LAG_S) > 0.1
+
+
+def preloaded(command, preload, stiffness=2100.0):
+    """The same machine with a preload of its spring, by small steps."""
+    finer, found = 20, np.empty(N)
+    lagged = way = speed = 0.0
+    for row in range(N):
+        found[row] = way
+        following = command[min(row + 1, N - 1)]
+        for part in range(finer):
+            at = command[row] + (following - command[row]) * (part + 0.5) / finer
+            step = STEP_S / finer
+            lagged += step * (at - lagged) / LAG_S
+            pull = stiffness * way + preload * np.clip(way / 1e-6, -1.0, 1.0)
+            speed += step * (GAIN * lagged - DAMPING * speed - pull) / MASS
+            way += step * speed
+    return found
+
+
+@pytest.mark.thorough
+def test_outputs_alone_of_a_simulation_with_a_lag_tell_a_preload_behind_it():
+    """Its lag, taken for the error of the drive behind it, had left no name."""
+    rng = np.random.default_rng(5)
+    inputs = {
+        f"{n}_{size}": size * one
+        for n, one in enumerate(commands())
+        for size in (1, -2)
+    }
+    recordings = [
+        Recording(
+            name, u, preloaded(u, 1.5) + 2e-6 * rng.standard_normal(N), STEP_S,
+            kind="other", input_unit="A", output_unit="m",
+        )
+        for name, u in inputs.items()
+    ]  # fmt: skip
+    given = {name: moved_behind(u, LAG_S, 2000.0) for name, u in inputs.items()}
+    found = diagnose_foreign(
+        recordings, Simulator(Capabilities(run=False), None, given),
+        DiagnoseOptions(effects=("spring_preload", "coulomb_friction", "input_delay")),
+        lambda tasks, *, keep: [one.function(*one.arguments) for one in tasks],
+        lambda what, total: None,
+    )  # fmt: skip
+
+    (effect,) = found.effects
+    assert (found.verdict, effect.id) == ("named", "spring_preload")
+    assert effect.parameters[0].value == pytest.approx(1.5 / GAIN, rel=0.02)
+    assert any("passes a lag of 0.012 s" in one for one in found.warnings)
