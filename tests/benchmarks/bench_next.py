@@ -37,7 +37,8 @@ from hwid_cli.records.model import FitOptions, Orders
 from hwid_cli.records.next import NextRecordings, PlannedInput
 from hwid_cli.records.recordings import RawRecording, Recording
 from hwid_cli.stages.calibrate import calibrate_all
-from hwid_cli.stages.next import ToChoose, propose_next
+from hwid_cli.stages.next import propose_next
+from hwid_cli.stages.next_goals import ToChoose
 from hwid_cli.stages.simulate import simulate_machine
 from hwid_cli.trust.choice import chosen_by_gain
 from hwid_cli.trust.content import content, joined, value_edges, visited_share

@@ -27,7 +27,8 @@ from scipy.signal import lfilter
 from hwid_cli.records.experiment import NextOptions
 from hwid_cli.records.next import NextRecordings, PlannedInput
 from hwid_cli.records.recordings import Recording
-from hwid_cli.stages.next import ToChoose, propose_next
+from hwid_cli.stages.next import propose_next
+from hwid_cli.stages.next_goals import ToChoose
 from tests.benchmarks.trust_plants import INPUTS, SAMPLE_TIME_S, make_input
 
 STRUCTURES = ("friction drive", "dead zone and lag", "lags and sensor")
