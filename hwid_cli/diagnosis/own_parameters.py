@@ -30,10 +30,12 @@ _HARDLY_FALLS = 0.999
 _FINE, _COARSE = 1e-6, 0.01
 _FIRST_EVALUATIONS = 4
 _LAST_FEW, _STILL_FALLS = 3, 0.8
-# Where far more than the noise is left, to move a parameter by its size costs the square of
-# this share of it: what hardly depends on it is not to lead it far away. A search that ends
-# without is followed by one with it where that moves one by so much of its size, [-].
-_HOLD, _FAR = 0.03, 0.5
+# To move a parameter by its size costs the square of this share of what is left: derivatives
+# say little so far from there, and what hardly depends on it is not to lead it far away, [-].
+HOLD = 0.03
+# A search that ends far from the noise without that price is followed by one with it, where
+# that moves a parameter by so much of its size, [-].
+_FAR = 0.5
 # Recordings that they are fitted to.
 _MOST_FITTED = 6
 
@@ -277,7 +279,7 @@ class _Gap:
     def is_led_off(self, found: Any) -> bool:
         """Whether a parameter is far from its stated value for next to nothing."""
         left = float(np.linalg.norm(found.fun))
-        hold = _HOLD * left * np.eye(found.x.size)
+        hold = HOLD * left * np.eye(found.x.size)
         stacked = np.vstack([found.jac, hold])
         pull = np.concatenate(
             [np.zeros_like(found.fun), hold @ (self._stated - found.x)]
@@ -294,7 +296,7 @@ class _Gap:
             What the search leaves there tells how much that costs.
         """
         left = self.errors(start)
-        hold = _HOLD * float(np.linalg.norm(left)) * np.eye(start.size)
+        hold = HOLD * float(np.linalg.norm(left)) * np.eye(start.size)
 
         def errors(coordinates: np.ndarray) -> np.ndarray:
             beside = hold @ (coordinates - self._stated)

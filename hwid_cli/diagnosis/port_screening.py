@@ -14,7 +14,7 @@ import numpy as np
 from hwid_cli.diagnosis.candidate import with_values
 from hwid_cli.diagnosis.effect_sets import is_nested
 from hwid_cli.diagnosis.findings import Findings
-from hwid_cli.diagnosis.own_parameters import cost_of, errors_of, linearised
+from hwid_cli.diagnosis.own_parameters import HOLD, cost_of, errors_of, linearised
 from hwid_cli.diagnosis.port_effects import PortSearch, moving_most, port_effects
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.simulator import Runs
@@ -31,9 +31,6 @@ _CLEARLY_LESS = 0.7
 _MOST_REFINED, _LESS, _BETWEEN = 3, 0.95, (1.73, 1.32)
 # What leaves so many times as much as another one is none beside it that leaves nothing.
 _FAR_BEHIND = 4.0
-# To double a parameter of the simulation costs this share of what it leaves: so far off,
-# derivatives say little, [-].
-_HOLD = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +173,7 @@ class _Screening:
     ) -> None:
         self._signals, self._search, self._values = signals, search, values
         errors, slopes = gap
-        hold = _HOLD * float(np.linalg.norm(errors)) * np.eye(slopes.shape[1])
+        hold = HOLD * float(np.linalg.norm(errors)) * np.eye(slopes.shape[1])
         self._slopes, self._plain = np.vstack([slopes, hold]), plain
         self._whole = self._unexplained(errors)[0]
 

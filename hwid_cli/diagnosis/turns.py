@@ -27,6 +27,7 @@ from hwid_cli.diagnosis.joint_fit import (
     pushes_of,
 )
 from hwid_cli.diagnosis.noise import measured_input_rms
+from hwid_cli.diagnosis.own_parameters import HOLD
 from hwid_cli.diagnosis.parameters import (
     BASE,
     each_sum_of_squares,
@@ -66,9 +67,6 @@ _FAR_BEHIND, _FEW_TURNS = 3.0, 3
 _SETTLED = 0.995
 # Over the noise, what a run may leave because its effect is a little late at corners.
 _LATE_AT_CORNERS = 1.1
-# To double a parameter of the simulation costs this share of what the last run left: the
-# stand-in knows little of it so far from there, [-].
-_HOLD = 0.03
 # Derivatives by the simulation's parameters are found again where one of these has moved by
 # more than this share.
 _SAME_SLOPES = 0.02
@@ -385,7 +383,7 @@ def _with_values(
     (found, forces), slopes = run_with, turn.slopes
     pushes = pushes_of(turn.problem, slopes, found)
     now = np.array([abs(turn.values[name]) or 1.0 for name in runs.simulator.free])
-    holds = _HOLD * float(np.sqrt(turn.sse.sum())) / now
+    holds = HOLD * float(np.sqrt(turn.sse.sum())) / now
     moved_by = slopes, pushes
     together = fitted_together(turn.problem, turn.fit, moved_by, holds, findings)
     if together is None:
