@@ -37,6 +37,9 @@ _FAR_ABOVE = 8.0
 # Mean square over the noise's beside which no further one is begun, unless runs have called
 # it likely by nearly the same share.
 _NEXT_TO_NOISE, _ALIKE = 2.0, 2.0
+# Far from the noise, what another effect at a port, or a richer law of it, leaves of a few
+# recordings at most to be fitted to all of them, over what the first one leaves.
+_CLEARLY_LESS = 0.5
 # Times what the first one of a pair leaves by itself, up to which another may be as well.
 _AS_LIKELY = 1.2
 
@@ -64,10 +67,11 @@ def at_ports_by_runs_alone(
     likely = tuple(one for one in likely if one not in tried.unbegun)
     starts = _begun_at_ports(tried, likely, runs)
     tried.least_begun = min((one.left for one in starts), default=np.inf)
+    in_vain = np.inf
     for start in starts:
         if tried.are_nearly_all() or runs.run_tasks.are_spent:
             break
-        if tried.is_hopeless(start):
+        if tried.is_hopeless(start) or start.left > _CLEARLY_LESS * in_vain:
             tried.given_up.add(start.fit.effects)
             continue
         is_large = start.left > STILL_LARGE**2
@@ -83,6 +87,7 @@ def at_ports_by_runs_alone(
             tried.later.append(start)
         else:
             tried.keep(through_runs_at_port(tried, start, runs))
+            in_vain = start.left if is_large else in_vain
     tried.keep(_with_wider_law(tried, runs))
 
 
@@ -231,7 +236,12 @@ def _with_wider_law(tried: TriedEffects, runs: Runs) -> list[Turn]:
     values = CATALOGUE[wide].starts(findings.scales)[0] | fitted_effects(fit)[effect]
     of_wide = port_effects(findings, {wide: values})
     start = begin_at_port(findings, of_wide, runs, best.values_of_run)
-    return [] if start is None else through_runs_at_port(tried, start, runs)
+    if start is None:
+        return []
+    is_far = start.left > STILL_LARGE**2
+    if is_far and start.left > _CLEARLY_LESS * tried.left_of_few(fit):
+        return []
+    return through_runs_at_port(tried, start, runs)
 
 
 def through_runs_at_port(

@@ -17,7 +17,12 @@ from hwid_cli.diagnosis.own_parameters import fit_parameters
 from hwid_cli.diagnosis.parameters import simulate_at
 from hwid_cli.diagnosis.problem import Signals
 from hwid_cli.diagnosis.simulator import Runs
-from hwid_cli.diagnosis.stand_in import force_beside, moved_as, standing_for
+from hwid_cli.diagnosis.stand_in import (
+    counts_by_base,
+    force_beside,
+    moved_as,
+    standing_for,
+)
 from hwid_cli.diagnosis.standing import standing_beside
 from hwid_cli.diagnosis.turns import (
     Turn,
@@ -25,6 +30,7 @@ from hwid_cli.diagnosis.turns import (
     as_sent,
     best_turn,
     forces_along,
+    have_moved,
     held,
     is_as_good,
     pushed,
@@ -39,6 +45,8 @@ _PREFERRED = 2.0
 # An effect through the input that leaves more than this share of what the base leaves is
 # tried at the force input as well.
 _CUT_OFF = 0.9
+# Share of a parameter's value by which it may have moved beside one stand-in, [-].
+_ANOTHER_STAND_IN = 0.05
 
 
 def settled(
@@ -86,7 +94,7 @@ def _best_of(findings: Findings, turn: Turn, runs: Runs) -> Turn:
     if not runs.simulator.free:
         return best_turn(findings, turn, runs)
     first = replace(turn, problem=held(findings.problem))
-    best = best_turn(findings, first, runs)
+    best = _beside_own_stand_in(findings, turn, best_turn(findings, first, runs), runs)
     if best.is_far_behind or runs.run_tasks.are_spent:
         return best
     if not is_as_good(best):
@@ -99,6 +107,29 @@ def _best_of(findings: Findings, turn: Turn, runs: Runs) -> Turn:
         # Its runs know the effect better than the first stand-in did.
         best = min(best, _again(findings, other, runs), key=_left_by)
     return other if _is_clearly_better(other, best) else best
+
+
+def _beside_own_stand_in(
+    findings: Findings, first: Turn, best: Turn, runs: Runs
+) -> Turn:
+    """The best turn, or where it leads beside a stand-in of the parameters that it has found.
+
+    What the input does, and what shares of the mass do, counts by the stand-in's base: a
+    delay would make up for a force constant that has been left behind.
+    """
+    effects, values = best.fit.effects, best.values_of_run
+    has_moved = have_moved(first.values, values, _ANOTHER_STAND_IN)
+    if best.tried is None or not has_moved or not counts_by_base(effects):
+        return best
+    if best.ran_away or best.is_far_behind or runs.run_tasks.are_spent:
+        return best
+    run = replace(best, fit=best.tried[0], values=values)
+    motions = simulate_at(run.problem, *rebuilt(run.problem, run.fit, findings.scales))
+    there = begun_with(run, runs, values, forces_along(run.problem, motions))
+    if there is None:
+        return best
+    beside = best_turn(findings, there, runs)
+    return best if beside.tried is None else beside
 
 
 def _again(findings: Findings, turn: Turn, runs: Runs) -> Turn:
@@ -169,11 +200,13 @@ def begun_with(
     if given is None or found is None:
         return None
     standing = standing_beside(runs, problem, given, values)
+    # Effects that were found before are in the drive, too.
+    drive = replace(standing.drive, effects=problem.drive.effects)
     signals = tuple(
-        _standing_with(standing.drive, one, run, force)
+        _standing_with(drive, one, run, force)
         for one, run, force in zip(standing.signals, found, forces, strict=True)
     )
-    there = held(replace(standing, signals=signals))
+    there = held(replace(standing, drive=drive, signals=signals))
     fit = where_it_starts(there, without_base(turn.fit))
     return Turn(there, fit, values, turn.said, turn.at_force, rival=turn.rival)
 

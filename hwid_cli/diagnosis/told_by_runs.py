@@ -107,10 +107,10 @@ class TriedEffects:
             return False
         if self.are_nearly_all():
             return True
-        of_runs = map(self._left_of_few, self.fits.values())
+        of_runs = map(self.left_of_few, self.fits.values())
         return start.left > _FAR_BEHIND * min([self.least_begun, *of_runs])
 
-    def _left_of_few(self, fit: CandidateFit) -> float:
+    def left_of_few(self, fit: CandidateFit) -> float:
         """Mean square over the noise's of the recordings that starts are fitted to."""
         problem, floors = self.findings.problem, self.findings.criteria.floors
         few = {one.name for one in moving_most(problem.signals)}

@@ -16,7 +16,7 @@ from tests.diagnosis.made_up_fits import CRITERIA, PROBLEM, base, made_up
 from tests.drive.drive_cases import SCALES
 
 
-def tried_at_ports(monkeypatch, lefts, sses, shares=()):
+def tried_at_ports(monkeypatch, lefts, sses, shares=(), said=None):
     """What is fitted through runs, of effects that screening calls likely.
 
     Parameters
@@ -25,14 +25,18 @@ def tried_at_ports(monkeypatch, lefts, sses, shares=()):
         What each leaves of few recordings, over the noise, and of all of them.
     shares : sequence of str
         Effects that were looked for.
+    said : float or None
+        Over the noise, what the stand-in says that an effect on the motion leaves.
     """
+    weight = None if said is None else made_up(("gravity",), 100.0 * said)
+    of_stand_in = {} if weight is None else {("gravity",): weight}
     findings = SimpleNamespace(
         criteria=CRITERIA,
         problem=PROBLEM,
         base=base(900.0),
         own_base=None,
         scales=SCALES,
-        found=SimpleNamespace(shares={(one,): 0.1 for one in shares}, fits={}),
+        found=SimpleNamespace(shares={(one,): 0.1 for one in shares}, fits=of_stand_in),
     )
     runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
     likely = tuple(
@@ -95,6 +99,20 @@ def test_the_richer_law_follows_where_the_plain_one_leaves_too_much(monkeypatch)
     sses["sensor_lag"] = 100.0
     found = tried_at_ports(monkeypatch, lefts, sses, shares=("sensor_lag", richer))
     assert found == (["sensor_lag"], [])
+
+
+def test_what_leaves_no_less_than_one_tried_in_vain_is_not_tried(monkeypatch):
+    """Three lags that leave the same took 1000 runs, and friction was missing."""
+    richer = "sensor_lag:second_order"
+    lefts = {"sensor_lag": 21.5, "actuator_lag": 21.6, richer: 21.7}
+    sses = dict.fromkeys(lefts, 2300.0)
+    options = {"shares": ("sensor_lag", richer), "said": 20.0}
+    found = tried_at_ports(monkeypatch, lefts, sses, **options)
+    assert found == (["sensor_lag"], [])
+    # Clearly less is worth it.
+    lefts |= {"actuator_lag": 50.0, richer: 9.5}
+    found = tried_at_ports(monkeypatch, lefts, sses, **options)
+    assert found == (["sensor_lag", richer], [])
 
 
 ZONE, DELAY = "input_dead_zone", "input_delay"
@@ -200,3 +218,67 @@ def test_a_second_likely_effect_is_begun_beside_one_that_leaves_nothing(
     tried = TriedEffects(SimpleNamespace())
     port_search._begun_at_ports(tried, likely, runs)
     assert asked == begun
+
+
+@pytest.mark.parametrize(
+    ("left_of_other", "left_of_pair", "fitted"),
+    [
+        # Beside the same dead zone both lags leave nothing ...
+        (28.0, 1.0, [("actuator_lag", ZONE), ("sensor_lag", ZONE)]),
+        # ... unless the other one leaves more of few recordings, alone or with it.
+        (50.0, 1.0, [("actuator_lag", ZONE)]),
+        (28.0, 30.0, [("actuator_lag", ZONE)]),
+    ],
+)
+def test_a_pair_that_leaves_nothing_has_others_alike_in_its_first_ones_place(
+    monkeypatch, left_of_other, left_of_pair, fitted
+):
+    """A lag before a motor was told for that of its tachometer, beside a dead zone."""
+    first, other = "actuator_lag", "sensor_lag"
+    lefts = {(first,): 27.0, (other,): left_of_other, (ZONE,): 60.0,
+             (first, ZONE): 1.0, (other, ZONE): left_of_pair}  # fmt: skip
+    values = {"gain": 2.0, f"{first}/time_constant_s": 0.1,
+              f"{other}/time_constant_s": 0.1, f"{ZONE}/threshold_A": 1.0}  # fmt: skip
+    stand_in = made_up(("gravity",), 6000.0)
+    findings = SimpleNamespace(
+        criteria=CRITERIA, problem=PROBLEM, base=base(1e4), own_base=None,
+        scales=SCALES,
+        found=SimpleNamespace(shares={}, fits={("gravity",): stand_in}),
+    )  # fmt: skip
+    runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
+    done = []
+
+    def of(effects):
+        owned = [ParameterRef.of_text(one) for one in values if "/" in one]
+        owned = tuple(one for one in owned if one.owner in effects)
+        return replace(made_up(effects, 1.0), names=owned, values=np.ones(len(owned)))
+
+    def screened(_findings, _runs, own, known=None):
+        pairs = [(first, ZONE)] if known else [(first,), (other,)]
+        return AtPorts({}, tuple(LikelyAtPort(0.3, of(one), own) for one in pairs))
+
+    def begin(_findings, one, _runs, _values):
+        own = {name: value for name, value in values.items()
+               if name.partition("/")[0] in (*one.effects, "gain")}  # fmt: skip
+        return PortStart(of(one.effects), own, lefts[one.effects], 0.3)
+
+    def fit(_findings, start, _runs):
+        done.append(start.fit.effects)
+        sse = 100.0 * start.left
+        run = of(start.fit.effects)
+        white = 0.5 if sse <= 100.0 else 9.0
+        run = replace(run, sse=np.full(6, sse), whiteness=white)
+        return SimpleNamespace(fit=run, sse=run.sse, values_of_run={"gain": 2.0})
+
+    monkeypatch.setattr(port_search, "screened_at_ports", screened)
+    monkeypatch.setattr(port_search, "begin_at_port", begin)
+    monkeypatch.setattr(port_search, "with_port_effects", fit)
+    for room in (port_search, told_by_runs):
+        monkeypatch.setattr(room, "fit_of_run", lambda _, turn: turn.fit)
+    monkeypatch.setattr(
+        port_search, "port_effects", lambda _findings, each: of(tuple(each))
+    )
+    tried = TriedEffects(findings)
+    port_search.at_ports_by_runs_alone(tried, runs, {"gain": 2.0}, may_pair=True)
+
+    assert done == fitted
