@@ -3,6 +3,7 @@
 docs/method_diagnosis.md, eq. (D32), (D33).
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from hwid_cli.diagnosis.candidate import rebuilt, without_owner
@@ -15,11 +16,15 @@ from hwid_cli.diagnosis.selection import (
 )
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
+from hwid_cli.diagnosis.stand_in import acts_at_port
 from hwid_cli.diagnosis.through_runs import followed
 from hwid_cli.diagnosis.turns import Turn, fit_of_run, is_as_good
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit
+
+# Share of its stated value by which a parameter is far from it, [-].
+_LED_AWAY = 0.5
 
 
 def confirm(
@@ -53,6 +58,7 @@ def confirm(
     if not findings.criteria.is_complete(fit_of_run(findings, best)):
         best = followed(findings, best, runs)
     best = _without_idle(findings, best, runs)
+    best = _without_imitations(findings, best, runs)
     found, criteria = _with_run(findings, best), findings.criteria
     run = found.verdict.chosen
     is_enough = is_as_good(best) or criteria.is_nearly_all(run, findings.base)
@@ -107,24 +113,66 @@ def _without_idle(findings: Findings, best: Turn, runs: Runs) -> Turn:
 
     They have made up for what the stand-in erred by before runs corrected it.
     """
-    criteria = findings.criteria
-    slight = LEAST_LAST_CONTRIBUTION * criteria.excess(findings.base)
-    run = fit_of_run(findings, best)
-    for effect in run.effects:
-        if len(run.effects) < 2 or not _may_go(effect, run.effects):
-            continue
-        if _acts_by(findings, best, effect) > slight or runs.run_tasks.are_spent:
-            continue
-        beside = replace(findings, problem=replace(best.problem, known={}))
-        smaller = without_owner(run, effect)
-        turn = settled(beside, smaller, runs, best.values_of_run)
-        if turn is None:
-            continue
-        fit = fit_of_run(findings, turn)
-        is_as_complete = criteria.is_complete(fit) or not criteria.is_complete(run)
-        if is_as_complete and criteria.excess(fit) <= criteria.excess(run) + slight:
-            best, run = turn, fit
+    slight = _slight(findings)
+    for effect in best.fit.effects:
+        if _acts_by(findings, best, effect) <= slight:
+            best = _without(findings, best, effect, best.values_of_run, runs)
     return best
+
+
+def _without_imitations(findings: Findings, best: Turn, runs: Runs) -> Turn:
+    """The run without effects at the ports that the simulation's own parameters have.
+
+    A parameter that had imitated what is missing is far from its stated value, and an effect
+    makes up for it: a pump's lag of 0.17 s had gone to its bound of 0.02 s, and a lag of the
+    input stood beside the overflow that was missing.
+    """
+    for effect in best.fit.effects:
+        values = _where_stated(runs, best.values_of_run)
+        if values != best.values_of_run and acts_at_port((effect,)):
+            best = _without(findings, best, effect, values, runs)
+    return best
+
+
+def _where_stated(runs: Runs, values: Mapping[str, float]) -> dict[str, float]:
+    """The same with parameters that are far from their stated values back there."""
+    stated = {name: one.value for name, one in runs.simulator.free.items()}
+    led = {
+        name: value
+        for name, value in stated.items()
+        if abs(values[name] - value) > _LED_AWAY * abs(value)
+    }
+    return {**values, **led}
+
+
+def _slight(findings: Findings) -> float:
+    """Squares by which an effect has to count, [output unit squared]."""
+    return LEAST_LAST_CONTRIBUTION * findings.criteria.excess(findings.base)
+
+
+def _without(
+    findings: Findings, best: Turn, effect: str, values: dict[str, float], runs: Runs
+) -> Turn:
+    """The run without one of several effects, if it leaves hardly more.
+
+    Parameters
+    ----------
+    values : dict of str to float
+        Parameters of the simulation to begin with.
+    """
+    criteria, run = findings.criteria, fit_of_run(findings, best)
+    if len(run.effects) < 2 or not _may_go(effect, run.effects):
+        return best
+    if runs.run_tasks.are_spent:
+        return best
+    beside = replace(findings, problem=replace(best.problem, known={}))
+    turn = settled(beside, without_owner(run, effect), runs, values)
+    if turn is None:
+        return best
+    fit = fit_of_run(findings, turn)
+    is_as_complete = criteria.is_complete(fit) or not criteria.is_complete(run)
+    is_as_little = criteria.excess(fit) <= criteria.excess(run) + _slight(findings)
+    return turn if is_as_complete and is_as_little else best
 
 
 def _may_go(effect: str, effects: tuple[str, ...]) -> bool:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from hwid_cli.diagnosis import confirmation
@@ -10,6 +11,7 @@ from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.records.drive import StandIn
+from hwid_cli.records.programs import FreeParameter
 from tests.diagnosis.made_up_fits import CRITERIA, base, made_up
 
 PAIR = ("cubic_stiffness", "one_sided_stop:contact")
@@ -41,7 +43,8 @@ def test_what_was_found_is_a_fact_where_its_own_run_bears_it_out(
     turn = SimpleNamespace(values_of_run={}, problem=drive)
     monkeypatch.setattr(confirmation, "settled", lambda *_: turn)
     monkeypatch.setattr(confirmation, "is_as_good", lambda _: True)
-    monkeypatch.setattr(confirmation, "_without_idle", lambda _, best, __: best)
+    for without in ("_without_idle", "_without_imitations"):
+        monkeypatch.setattr(confirmation, without, lambda _, best, __: best)
     monkeypatch.setattr(confirmation, "followed", lambda _, best, __: best)
     monkeypatch.setattr(confirmation, "fit_of_run", lambda *_: run)
     monkeypatch.setattr(
@@ -146,3 +149,47 @@ def test_rivals_are_those_that_leave_as_little_in_the_simulation(
 
     assert found.verdict.word == word
     assert bool(found.verdict.rivals) is (word == "ambiguous")
+
+
+@pytest.mark.parametrize(
+    ("effects", "lag_s", "left", "kept"),
+    [
+        # The pump's own lag does as well once it is back where it was stated ...
+        (("actuator_lag", "end_stop"), 0.02, 100.0, ("end_stop",)),
+        # ... unless more is left, or it has stayed there, or nothing else would be left.
+        (("actuator_lag", "end_stop"), 0.02, 300.0, ("actuator_lag", "end_stop")),
+        (("actuator_lag", "end_stop"), 0.15, 100.0, ("actuator_lag", "end_stop")),
+        (("actuator_lag",), 0.02, 100.0, ("actuator_lag",)),
+        # What acts on the motion is no parameter's imitation.
+        (("cogging", "end_stop"), 0.02, 100.0, ("cogging", "end_stop")),
+    ],
+)
+def test_an_effect_that_makes_up_for_a_parameter_led_away_goes(
+    monkeypatch, effects, lag_s, left, kept
+):
+    run = made_up(effects, 100.0)
+    best = SimpleNamespace(
+        fit=run, values_of_run={"lag": lag_s, "gain": 2.0}, problem=base
+    )
+    asked = []
+
+    def settled(_findings, fit, _runs, values):
+        asked.append(values)
+        fit = replace(fit, sse=np.full(6, left))
+        return SimpleNamespace(fit=fit, values_of_run=values, problem=base)
+
+    def smaller(fit, owner):
+        return replace(fit, effects=tuple(one for one in fit.effects if one != owner))
+
+    monkeypatch.setattr(confirmation, "settled", settled)
+    monkeypatch.setattr(confirmation, "fit_of_run", lambda _, turn: turn.fit)
+    monkeypatch.setattr(confirmation, "replace", lambda one, **_: one)
+    monkeypatch.setattr(confirmation, "without_owner", smaller)
+    free = {"lag": FreeParameter(0.17, (0.02, 0.6)), "gain": FreeParameter(2.1)}
+    runs = SimpleNamespace(
+        simulator=SimpleNamespace(free=free), run_tasks=SimpleNamespace(are_spent=False)
+    )
+    findings = SimpleNamespace(criteria=CRITERIA, base=base(900.0))
+    found = confirmation._without_imitations(findings, best, runs)
+    assert found.fit.effects == kept
+    assert all(one == {"lag": 0.17, "gain": 2.0} for one in asked)
