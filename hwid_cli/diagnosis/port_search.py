@@ -24,7 +24,7 @@ from hwid_cli.diagnosis.stand_in import acts_at_port
 from hwid_cli.diagnosis.told_by_runs import TriedEffects
 from hwid_cli.diagnosis.turns import Turn, fit_of_run
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
-from hwid_cli.records.candidates import CandidateFit
+from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.diagnosis import STILL_LARGE
 
 # Effects at its ports that the simulation's runs alone call likely: so many are fitted.
@@ -184,14 +184,18 @@ def _alike_in_pairs(
     if best is None:
         return []
     (known,) = first.of_effects
-    values = fitted_effects(best.fit)
-    second = {one: values[one] for one in values if one != known}
+    second = {one: of for one, of in fitted_effects(best.fit).items() if one != known}
+    values = best.values_of_run | {
+        str(ParameterRef(one, name)): value
+        for one, of in second.items()
+        for name, value in of.items()
+    }
     found: list[Turn] = []
     for other in alike:
         if runs.run_tasks.are_spent or set(other.of_effects) & set(second):
             continue
         fit = port_effects(tried.findings, {**other.of_effects, **second})
-        begun = begin_at_port(tried.findings, fit, runs, best.values_of_run)
+        begun = begin_at_port(tried.findings, fit, runs, values)
         if begun is not None and begun.left <= STILL_LARGE**2:
             found += through_runs_at_port(tried, begun, runs)
     return found

@@ -246,7 +246,7 @@ def test_a_pair_that_leaves_nothing_has_others_alike_in_its_first_ones_place(
         found=SimpleNamespace(shares={}, fits={("gravity",): stand_in}),
     )  # fmt: skip
     runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
-    done = []
+    done, begun = [], []
 
     def of(effects):
         owned = [ParameterRef.of_text(one) for one in values if "/" in one]
@@ -257,7 +257,9 @@ def test_a_pair_that_leaves_nothing_has_others_alike_in_its_first_ones_place(
         pairs = [(first, ZONE)] if known else [(first,), (other,)]
         return AtPorts({}, tuple(LikelyAtPort(0.3, of(one), own) for one in pairs))
 
-    def begin(_findings, one, _runs, _values):
+    def begin(_findings, one, _runs, given):
+        # One effect at most is begun at any size; of the other its values are known.
+        begun.append({name.partition("/")[0] for name in given} - {"gain"})
         own = {name: value for name, value in values.items()
                if name.partition("/")[0] in (*one.effects, "gain")}  # fmt: skip
         return PortStart(of(one.effects), own, lefts[one.effects], 0.3)
@@ -282,3 +284,4 @@ def test_a_pair_that_leaves_nothing_has_others_alike_in_its_first_ones_place(
     port_search.at_ports_by_runs_alone(tried, runs, {"gain": 2.0}, may_pair=True)
 
     assert done == fitted
+    assert begun[4:] == [{ZONE}] * (left_of_other < 40.0)
