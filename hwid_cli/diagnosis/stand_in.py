@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from hwid_cli.diagnosis.problem import Signals
-from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.simulation import Motion, parameter_vector, run, set_start
 from hwid_cli.drive.springs import spring_force, stiffness_at
 from hwid_cli.records.drive import BASE_PARAMETERS, HELD, Drive, StandIn
@@ -137,16 +137,6 @@ def change_between(before: StandIn, after: StandIn) -> StandInChange:
         ),
         curve=factor(before.bends[bend], after.bends[bend]),
     )
-
-
-# Effects on the motion that are shares of the drive's own mass, damping or force.
-_OF_THE_BASE = (
-    "gear_backlash",
-    "second_mode",
-    "elastic_coupling",
-    "load_friction",
-    "parameter_change",
-)
 
 
 def in_newtons(drive: StandIn, force_gain: float) -> StandIn:
@@ -515,10 +505,8 @@ def acts_at_port(effects: Sequence[str]) -> bool:
 
 def counts_by_base(effects: Sequence[str]) -> bool:
     """Whether what effects do depends on the drive's own mass, springs or force constant."""
-    return any(
-        CATALOGUE[one].enters in ("command", "force") or public_id(one) in _OF_THE_BASE
-        for one in effects
-    )
+    entries = [CATALOGUE[one] for one in effects]
+    return any(one.is_of_base or one.enters in ("command", "force") for one in entries)
 
 
 def force_of_motion(drive: Drive, signals: Signals, motion: Motion) -> np.ndarray:

@@ -389,6 +389,8 @@ class Effect:
         Whether the drive moves before its input does, so that recordings start in motion.
     is_of_clock : bool
         Whether it reads the motion at other times, which no reading of the samples gives.
+    is_of_base : bool
+        Whether what it does is a share of the drive's own mass, damping, spring or force.
     strength : str
         Name of the parameter without which the effect is not there: where it is zero,
         or for a limit beyond all that it limits. Empty means the first one.
@@ -430,6 +432,7 @@ class Effect:
     bounces: bool = False
     moves_at_rest: bool = False
     is_of_clock: bool = False
+    is_of_base: bool = False
     is_linear: bool = False
     strength: str = ""
     size: Callable[[Values, Scales], float] | None = None

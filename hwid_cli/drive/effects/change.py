@@ -42,6 +42,7 @@ EFFECTS = tuple(
         confused_with={"force_constant_saturation": "repeats of the same recording"},
         # A free axis hardly tells a load from another force constant.
         needs_spring=which == "stiffness",
+        is_of_base=True,
     )
     for which in CHANGING
 )

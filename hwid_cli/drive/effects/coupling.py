@@ -194,6 +194,7 @@ GEAR = Effect(
     is_rugged=True,
     # Without a gap and without damping in contact, where teeth do not pull.
     contains=("elastic_coupling:load",),
+    is_of_base=True,
 )
 
 MODE = Effect(
@@ -226,6 +227,7 @@ MODE = Effect(
     resonant=_swings_at,
     confused_with={"input_delay": "a multisine over the whole band"},
     is_linear=True,
+    is_of_base=True,
 )
 
 PERIODIC = Effect(
@@ -316,6 +318,7 @@ def _elastic(sensor: str, looks_like: dict[str, str]) -> Effect:
         # A motor without an inertia of its own is a lag.
         told_by="motor_share",
         is_linear=True,
+        is_of_base=True,
     )
 
 

@@ -183,6 +183,7 @@ LOAD = tuple(
         },
         contains=("coulomb_friction",),
         needs_spring=load == "spring",
+        is_of_base=True,
     )
     for load, place in LOADS.items()
 )
