@@ -35,9 +35,8 @@ def band_note(band: Band, unit: str, judged_on: Sequence[str]) -> str:
     where = band.inside
     told = "no recording beside the fit tells its width"
     if judged_on:
-        verb = "tells" if len(judged_on) == 1 else "tell"
         which = listed(judged_on, most=_FEW)
-        told = f"its width is what {which} {verb}, which the fit had not used"
+        told = f"its width is told by {which}, held out or left out in turn"
     width = number(float(np.mean(band.upper - band.lower)))
     beyond = 1.0 - float(where.amplitude.mean())
     says_so = (
