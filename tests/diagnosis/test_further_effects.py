@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis import foreign, further_effects
+from hwid_cli.diagnosis import beside_stand_in, further_effects
 from hwid_cli.diagnosis.further_effects import with_further_effect
 from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.diagnosis.told_by_runs import ToldByRuns
@@ -27,8 +27,8 @@ def test_a_second_effect_is_told_beside_the_run_with_the_first(monkeypatch):
         assert options.max_effects == 1, "no set beside the uncorrected stand-in"
         return find(standing, options, *args, **more)
 
-    find = foreign.find
-    monkeypatch.setattr(foreign, "find", only_single)
+    find = beside_stand_in.find
+    monkeypatch.setattr(beside_stand_in, "find", only_single)
     hidden = Hidden("both", (), dry=2.0, force=lambda x, v, t: -1.5e6 * x**3)
     able = Capabilities(run=True, parameters=True, force=True)
     found, _ = diagnosis(
