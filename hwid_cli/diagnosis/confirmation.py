@@ -124,8 +124,7 @@ def _without_imitations(findings: Findings, best: Turn, runs: Runs) -> Turn:
     """The run without effects at the ports that the simulation's own parameters have.
 
     A parameter that had imitated what is missing is far from its stated value, and an effect
-    makes up for it: a pump's lag of 0.17 s had gone to its bound of 0.02 s, and a lag of the
-    input stood beside the overflow that was missing.
+    makes up for it: a lag of the input where a pump's own lag has gone to its bound.
     """
     for effect in best.fit.effects:
         values = _where_stated(runs, best.values_of_run)

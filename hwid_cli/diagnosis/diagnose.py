@@ -25,6 +25,7 @@ from hwid_cli.diagnosis.candidate import (
     fitted_drive,
     rebuilt,
 )
+from hwid_cli.diagnosis.candidate_words import title_of
 from hwid_cli.diagnosis.causes import without_damage, without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.found_start import with_found_start
@@ -76,7 +77,6 @@ from hwid_cli.diagnosis.selection import (
     LEAST_GAIN,
     MOST_LEFT_BY_SET,
     SelectionCriteria,
-    title_of,
 )
 from hwid_cli.diagnosis.set_fits import Rounds
 from hwid_cli.diagnosis.tasks import OnRound, RunTasks

@@ -6,8 +6,9 @@ part of the sets that leave little for its own error. docs/method_diagnosis.md, 
 
 import numpy as np
 
+from hwid_cli.diagnosis.candidate_words import title_of, with_best_so_far
 from hwid_cli.diagnosis.findings import Findings
-from hwid_cli.diagnosis.selection import LEAST_GAIN, count, title_of, with_best_so_far
+from hwid_cli.diagnosis.selection import LEAST_GAIN, count
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.tasks import OnRound

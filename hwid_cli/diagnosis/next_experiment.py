@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hwid_cli.diagnosis.candidate import belongs_to, rebuilt
+from hwid_cli.diagnosis.candidate_words import title_of
 from hwid_cli.diagnosis.parameters import (
     ParameterLayout,
     ParameterPoint,
@@ -20,7 +21,7 @@ from hwid_cli.diagnosis.parameters import (
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import derivatives
-from hwid_cli.diagnosis.selection import TIE, SelectionCriteria, title_of
+from hwid_cli.diagnosis.selection import TIE, SelectionCriteria
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import Motion

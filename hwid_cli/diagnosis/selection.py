@@ -6,7 +6,7 @@ most of their error beyond the noise must be explained, in most of them.
 docs/method_diagnosis.md, eq. (D21) to (D24).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import inf
@@ -671,38 +671,6 @@ def rivals(
 def _excess_of_held_out(criteria: SelectionCriteria, found: CandidateFit) -> float:
     """Mean square beyond the noise of the recordings that judge, over the noise's, [-]."""
     return criteria.ratio(found) ** 2 - 1.0
-
-
-def title_of(found: CandidateFit) -> str:
-    """Public ids of a set of effects, with which of its kinds each is, in words."""
-    return " with ".join(_title(one) for one in found.effects)
-
-
-def _title(identifier: str) -> str:
-    """Public id, with what only the catalogue tells apart.
-
-    Examples
-    --------
-    >>> _title("elastic_coupling:load"), _title("gravity")
-    ('elastic_coupling (load)', 'gravity')
-    """
-    name, _, kind = identifier.partition(":")
-    return f"{name} ({kind.replace('_', ' ')})" if kind else name
-
-
-def with_best_so_far(
-    what: str,
-    criteria: SelectionCriteria,
-    fits: Iterable[CandidateFit],
-    base: CandidateFit,
-) -> str:
-    """What begins, with what leads until now: a search that is stopped has said so much."""
-    usable = [one for one in fits if one.is_usable]
-    if not usable:
-        return what
-    best = max(usable, key=lambda one: criteria.gain(one, base))
-    left = f"{criteria.ratio(best):.3g} times the noise"
-    return f"{what} (so far {title_of(best)}, {left})"
 
 
 def names_of(found: CandidateFit) -> tuple[str, ...]:

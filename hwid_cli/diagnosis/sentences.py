@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from hwid_cli.diagnosis.candidate_words import title_of
 from hwid_cli.diagnosis.law_names import known_terms
 from hwid_cli.diagnosis.odd_recordings import (
     NEARLY_ALL,
@@ -13,7 +14,7 @@ from hwid_cli.diagnosis.odd_recordings import (
     went_another_way,
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.selection import SelectionCriteria, title_of
+from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, lead
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.axis import name_on

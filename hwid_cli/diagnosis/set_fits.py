@@ -21,6 +21,7 @@ from hwid_cli.diagnosis.candidate import (
     start_from,
     with_input_noise,
 )
+from hwid_cli.diagnosis.candidate_words import with_best_so_far
 from hwid_cli.diagnosis.effect_sets import Effects
 from hwid_cli.diagnosis.few_samples import fewer_recordings
 from hwid_cli.diagnosis.growing import (
@@ -37,7 +38,6 @@ from hwid_cli.diagnosis.selection import (
     has_own_values,
     is_part_of,
     select_best,
-    with_best_so_far,
 )
 from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.drive.catalogue import CATALOGUE

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hwid_cli.diagnosis.candidate_words import with_best_so_far
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.port_effects import begin_at_port
 from hwid_cli.diagnosis.port_search import (
@@ -24,7 +25,6 @@ from hwid_cli.diagnosis.selection import (
     count,
     is_part_of,
     select_best,
-    with_best_so_far,
 )
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs

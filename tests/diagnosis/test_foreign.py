@@ -126,8 +126,7 @@ def test_friction_is_named_and_confirmed_in_the_simulation_with_its_parameters()
 
 
 @pytest.mark.thorough
-def test_a_delay_beside_friction_counts_by_the_parameters_that_it_has_led_to():
-    """Beside a stand-in of the imitated ones a delay of 24 ms was told as 29 ms."""
+def test_a_delay_beside_friction_is_told_from_a_lag_with_parameters_far_off():
     able = Capabilities(run=True, parameters=True, force=True)
     late, given = 8, {**GIVEN, "k": 2000.0, "kt": 7.0}
     machine = [

@@ -118,6 +118,45 @@ def test_what_leaves_no_less_than_one_tried_in_vain_is_not_tried(monkeypatch):
 ZONE, DELAY = "input_dead_zone", "input_delay"
 
 
+def owning(values, effects, sse=1.0):
+    """A made-up fit of effects whose parameters are among some values, each 1."""
+    owned = [ParameterRef.of_text(one) for one in values if "/" in one]
+    owned = tuple(one for one in owned if one.owner in effects)
+    white = 0.5 if sse <= 100.0 else 9.0
+    fit = made_up(effects, sse, whiteness=white)
+    return replace(fit, names=owned, values=np.ones(len(owned)))
+
+
+def pair_findings(said):
+    """Findings beside a base far from the noise; `said` times that an effect leaves."""
+    stand_in = made_up(("gravity",), 100.0 * said)
+    return SimpleNamespace(
+        criteria=CRITERIA, problem=PROBLEM, base=base(1e4), own_base=None,
+        scales=SCALES,
+        found=SimpleNamespace(shares={}, fits={("gravity",): stand_in}),
+    )  # fmt: skip
+
+
+def fitted_pairs(monkeypatch, values, screened, begin):
+    """Effects that are fitted to all recordings, in turn, as a list that grows."""
+    done = []
+
+    def fit(_findings, start, _runs):
+        done.append(start.fit.effects)
+        run = owning(values, start.fit.effects, 100.0 * start.left)
+        return SimpleNamespace(fit=run, sse=run.sse, values_of_run={"gain": 2.0})
+
+    monkeypatch.setattr(port_search, "screened_at_ports", screened)
+    monkeypatch.setattr(port_search, "begin_at_port", begin)
+    monkeypatch.setattr(port_search, "with_port_effects", fit)
+    for room in (port_search, told_by_runs):
+        monkeypatch.setattr(room, "fit_of_run", lambda _, turn: turn.fit)
+    monkeypatch.setattr(
+        port_search, "port_effects", lambda _, each: owning(values, tuple(each))
+    )
+    return done
+
+
 @pytest.mark.parametrize(
     ("said", "left_alone", "left_both", "left_of_second", "fitted"),
     [
@@ -139,45 +178,18 @@ def test_a_second_effect_at_a_port_is_tried_beside_the_first(
 ):
     lefts = {(ZONE,): left_alone, (ZONE, DELAY): left_both, (DELAY,): left_of_second}
     values = {"gain": 2.0, f"{ZONE}/threshold_A": 1.0, f"{DELAY}/delay_s": 3.0}
-    stand_in = made_up(("gravity",), 100.0 * said)
-    findings = SimpleNamespace(
-        criteria=CRITERIA, problem=PROBLEM, base=base(1e4), own_base=None,
-        scales=SCALES,
-        found=SimpleNamespace(shares={}, fits={("gravity",): stand_in}),
-    )  # fmt: skip
+    findings, beside = pair_findings(said), []
     runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
-    done, beside = [], []
-
-    def of(effects):
-        owned = [ParameterRef.of_text(one) for one in values if "/" in one]
-        owned = tuple(one for one in owned if one.owner in effects)
-        return replace(made_up(effects, 1.0), names=owned, values=np.ones(len(owned)))
 
     def screened(_findings, _runs, own, known=None):
         beside.append(known)
         effects = (ZONE, DELAY) if known else (ZONE,)
-        return AtPorts({}, (LikelyAtPort(0.3, of(effects), own),))
+        return AtPorts({}, (LikelyAtPort(0.3, owning(values, effects), own),))
 
-    def fit(_findings, start, _runs):
-        done.append(start.fit.effects)
-        sse = 100.0 * start.left
-        run = made_up(start.fit.effects, sse, whiteness=0.5 if sse <= 100.0 else 9.0)
-        return SimpleNamespace(fit=run, sse=run.sse, values_of_run={})
+    def begin(_findings, one, _runs, _values):
+        return PortStart(owning(values, one.effects), values, lefts[one.effects], 0.3)
 
-    monkeypatch.setattr(port_search, "screened_at_ports", screened)
-    monkeypatch.setattr(port_search, "with_port_effects", fit)
-    for room in (port_search, told_by_runs):
-        monkeypatch.setattr(room, "fit_of_run", lambda _, turn: turn.fit)
-    monkeypatch.setattr(
-        port_search, "port_effects", lambda _findings, each: of(tuple(each))
-    )
-    monkeypatch.setattr(
-        port_search,
-        "begin_at_port",
-        lambda _f, one, _r, _v: PortStart(
-            of(one.effects), values, lefts[one.effects], 0.3
-        ),
-    )
+    done = fitted_pairs(monkeypatch, values, screened, begin)
     tried = TriedEffects(findings)
     port_search.at_ports_by_runs_alone(tried, runs, {"gain": 2.0}, may_pair=True)
     assert done == fitted
@@ -239,47 +251,22 @@ def test_a_pair_that_leaves_nothing_has_others_alike_in_its_first_ones_place(
              (first, ZONE): 1.0, (other, ZONE): left_of_pair}  # fmt: skip
     values = {"gain": 2.0, f"{first}/time_constant_s": 0.1,
               f"{other}/time_constant_s": 0.1, f"{ZONE}/threshold_A": 1.0}  # fmt: skip
-    stand_in = made_up(("gravity",), 6000.0)
-    findings = SimpleNamespace(
-        criteria=CRITERIA, problem=PROBLEM, base=base(1e4), own_base=None,
-        scales=SCALES,
-        found=SimpleNamespace(shares={}, fits={("gravity",): stand_in}),
-    )  # fmt: skip
+    findings, begun = pair_findings(60.0), []
     runs = SimpleNamespace(run_tasks=SimpleNamespace(are_spent=False))
-    done, begun = [], []
-
-    def of(effects):
-        owned = [ParameterRef.of_text(one) for one in values if "/" in one]
-        owned = tuple(one for one in owned if one.owner in effects)
-        return replace(made_up(effects, 1.0), names=owned, values=np.ones(len(owned)))
 
     def screened(_findings, _runs, own, known=None):
         pairs = [(first, ZONE)] if known else [(first,), (other,)]
-        return AtPorts({}, tuple(LikelyAtPort(0.3, of(one), own) for one in pairs))
+        likely = (LikelyAtPort(0.3, owning(values, one), own) for one in pairs)
+        return AtPorts({}, tuple(likely))
 
     def begin(_findings, one, _runs, given):
         # One effect at most is begun at any size; of the other its values are known.
         begun.append({name.partition("/")[0] for name in given} - {"gain"})
         own = {name: value for name, value in values.items()
                if name.partition("/")[0] in (*one.effects, "gain")}  # fmt: skip
-        return PortStart(of(one.effects), own, lefts[one.effects], 0.3)
+        return PortStart(owning(values, one.effects), own, lefts[one.effects], 0.3)
 
-    def fit(_findings, start, _runs):
-        done.append(start.fit.effects)
-        sse = 100.0 * start.left
-        run = of(start.fit.effects)
-        white = 0.5 if sse <= 100.0 else 9.0
-        run = replace(run, sse=np.full(6, sse), whiteness=white)
-        return SimpleNamespace(fit=run, sse=run.sse, values_of_run={"gain": 2.0})
-
-    monkeypatch.setattr(port_search, "screened_at_ports", screened)
-    monkeypatch.setattr(port_search, "begin_at_port", begin)
-    monkeypatch.setattr(port_search, "with_port_effects", fit)
-    for room in (port_search, told_by_runs):
-        monkeypatch.setattr(room, "fit_of_run", lambda _, turn: turn.fit)
-    monkeypatch.setattr(
-        port_search, "port_effects", lambda _findings, each: of(tuple(each))
-    )
+    done = fitted_pairs(monkeypatch, values, screened, begin)
     tried = TriedEffects(findings)
     port_search.at_ports_by_runs_alone(tried, runs, {"gain": 2.0}, may_pair=True)
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hwid_cli.diagnosis.candidate_words import title_of
 from hwid_cli.diagnosis.parameters import BASE
 from hwid_cli.diagnosis.ranking import ranked
 from hwid_cli.diagnosis.selection import (
@@ -20,7 +21,6 @@ from hwid_cli.diagnosis.selection import (
     is_part_of,
     rivals,
     select_best,
-    title_of,
 )
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide, lead
 from hwid_cli.drive.catalogue import CATALOGUE
