@@ -57,6 +57,13 @@ lack along that motion (right): a force, or an error of the sensor.
 Start values and bounds of the search scale with the recordings: X largest displacement, V largest velocity, I largest current,
 R largest rate of the current, S stroke, F = kt I, M mass, fn natural frequency, Ts sample time, T longest recording, Ro resistance,
 Y largest reading of the sensor (X, or V where a velocity is measured).
+
+In equations Iref and xr are what losses and errors at the reference count from: the largest current and output of the training
+recordings, unless `simulation.reference_current_A` and `reference_displacement_m` say otherwise. `per_turn`, the n of sin(n x + p), counts
+periods of a turn where x is an angle in rad, and is 2 pi over the period in m on a straight axis. Laws with a memory start settled at the first
+sample (the current of a lag is what is commanded there, a delay and a rate limit have had it before), heating starts cold. Shares of a damper or of friction, s in equations of two
+bodies, are those of the body that the motor moves (`motor_damping_share` and the like). Where equations are joined by "or", a word that stands beside the parameters in `simulation.effects` says which:
+`curve`, `sensor`, `load`, `order` and so on, as each section names it; without it the first is meant.
 """
 CHANGE = "parameter_change"
 CHANGE_SENTENCE = (

@@ -17,10 +17,11 @@ from hwid_cli.diagnosis.candidate import (
     start_from,
 )
 from hwid_cli.diagnosis.effect_sets import Effects
+from hwid_cli.diagnosis.growing import is_rugged
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
 from hwid_cli.diagnosis.selection import LEAST_GAIN, NEARLY_THE_REST, TIE, count
-from hwid_cli.diagnosis.set_fits import Rounds, fit_task
+from hwid_cli.diagnosis.set_fits import FAR_BEHIND, Rounds, fit_task, growing_task
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.drive import HELD, LINE
 
@@ -139,13 +140,12 @@ def _better_if_held(
     """Fits of sets beside a held command that do better than a set beside a line."""
     if not (best.is_usable and _matters(rounds, best)):
         return []
-    criteria, held = rounds.criteria, with_held_command(rounds.problem)
+    criteria = rounds.criteria
+    held = replace(rounds, problem=with_held_command(rounds.problem))
     rounds.on_round("the command held", len(sets))
-    tasks = [
-        fit_task(replace(rounds, problem=held), ids, [start], None)
-        for ids, start in sets.items()
-    ]
+    tasks = [fit_task(held, ids, [start], None) for ids, start in sets.items()]
     fits: list[CandidateFit] = rounds.run_tasks(tasks, keep=True)
+    fits += _grown(held, fits)
     return [
         one
         for one in fits
@@ -153,6 +153,27 @@ def _better_if_held(
         if criteria.gain(one, best)
         >= (-TIE if count(one) < count(best) else LEAST_GAIN)
     ]
+
+
+def _grown(held: Rounds, fits: list[CandidateFit]) -> list[CandidateFit]:
+    """The best rugged set beside a held command, fitted again to growing parts.
+
+    Half a sample is enough for such a fit to end in another valley beside a line, from
+    which no further fit leads away.
+    """
+    criteria = held.criteria
+    usable = [one for one in fits if one.is_usable]
+    rugged = [one for one in usable if is_rugged(one.effects)]
+    if not rugged:
+        return []
+    least, best = (min(these, key=criteria.excess) for these in (usable, rugged))
+    is_far = criteria.excess(best) > FAR_BEHIND * criteria.excess(least)
+    if is_far or criteria.is_complete(least):
+        return []
+    held.on_round("the command held, growing parts", 1)
+    task = growing_task(held, best, to_the_end=False)
+    found: list[CandidateFit] = held.run_tasks([task], keep=True)
+    return found
 
 
 def _without_each(rounds: Rounds, best: CandidateFit) -> dict[Effects, SearchStart]:

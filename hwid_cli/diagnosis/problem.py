@@ -224,11 +224,15 @@ class Signals:
 
     @cached_property
     def rest_position_m(self) -> float:
-        """Mean of the position before the input first moves; of a velocity 0."""
+        """Level of the position before input or position first move; of a velocity 0.
+
+        A free axis moves under an input that is constant from its first sample on.
+        """
         if self.is_velocity:
             return 0.0
-        still = rest_length(self.driven_by)
-        return float(np.mean(self.output[: max(1, still)]))
+        rest = self.output[: max(1, rest_length(self.driven_by))]
+        # In a few samples nothing gets far.
+        return float(np.mean(rest)) if rest.size < _LEAST_REST else level_of_rest(rest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -549,16 +553,33 @@ def with_level_of_rest(driven_by: np.ndarray) -> np.ndarray:
         The same numbers where the input is free of noise, or moves at once.
     """
     found = np.array(driven_by, dtype=float)
+    found[0] = level_of_rest(driven_by)
+    return found
+
+
+def level_of_rest(values: np.ndarray) -> float:
+    """Level of the first samples, for as long as a signal rests.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_samples,)
+
+    Returns
+    -------
+    float
+        The first sample itself where the signal is free of noise, or moves at once.
+    """
+    found = float(values[0])
     n = _LEAST_REST
-    # As long as both halves have the same level, the input rests.
-    while n <= driven_by.size:
-        first, second = (float(np.mean(one)) for one in np.split(driven_by[:n], 2))
-        bends = np.diff(driven_by[:n], 4)
+    # As long as both halves have the same level, the signal rests.
+    while n <= values.size:
+        first, second = (float(np.mean(one)) for one in np.split(values[:n], 2))
+        bends = np.diff(values[:n], 4)
         # White noise is 70 times as strong in its fourth differences.
         noise = float(np.sqrt(np.mean(bends**2) / 70.0))
         if noise == 0.0 or abs(second - first) > _SAME_LEVEL * 2.0 * noise / n**0.5:
             break
-        found[0] = (first + second) / 2.0
+        found = (first + second) / 2.0
         n *= 2
     return found
 

@@ -198,9 +198,12 @@ class SelectionCriteria:
 
     def is_close_to_noise(self, found: CandidateFit) -> bool:
         """Whether too little is left for a name, of held-out recordings and of all."""
+        return found.is_usable and self._over_noise_at_most(found) <= A_THIRD_MORE
+
+    def _over_noise_at_most(self, found: CandidateFit) -> float:
+        """What held-out recordings leave or all, whichever is more, over the noise."""
         every = np.ones(self.is_held_out.size, dtype=bool)
-        over = max(self.ratio(found), self._over_noise(found, every))
-        return found.is_usable and over <= A_THIRD_MORE
+        return max(self.ratio(found), self._over_noise(found, every))
 
     def evidence(self, found: CandidateFit, other: CandidateFit) -> Evidence:
         """How a candidate does against another one."""
@@ -329,6 +332,21 @@ class SelectionCriteria:
         if self.leaves_noise(found):
             return True
         return self.excess(found) < LEAST_LAST_CONTRIBUTION * self.excess(base)
+
+    def leaves_nothing_of_account(
+        self, found: CandidateFit, base: CandidateFit
+    ) -> bool:
+        """Whether what is left, of held-out recordings and of all, calls for nothing more.
+
+        Many samples show it; it is a small part of the gap and drowns in the noise.
+
+        Parameters
+        ----------
+        base : CandidateFit
+            Re-fitted, without further effects.
+        """
+        is_near = self._over_noise_at_most(found) <= CLOSE_TO_NOISE
+        return is_near and self.is_small_part(found, base)
 
     def leaves_next_to_nothing(self, found: CandidateFit, base: CandidateFit) -> bool:
         """Whether what is left is hardly above the noise, and next to nothing of the gap.

@@ -394,7 +394,7 @@ class SetFits:
         self._begin(f"{name_of(len(chosen.effects))}, growing parts", 1)
         self.keep(
             self.rounds.run_tasks(
-                [_growing_task(self.rounds, chosen, to_the_end)], keep=True
+                [growing_task(self.rounds, chosen, to_the_end)], keep=True
             )
         )
 
@@ -445,7 +445,7 @@ def fit_task(
     )  # fmt: skip
 
 
-def _growing_task(
+def growing_task(
     rounds: Rounds, found: CandidateFit, to_the_end: bool
 ) -> DiagnosisTask:
     """Task that fits a set again, to growing parts of the recordings."""

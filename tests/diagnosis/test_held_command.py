@@ -188,3 +188,36 @@ def test_larger_sets_are_left_out_where_the_next_best_is_all_beside_a_held_comma
     found = RoundsResult({one.effects: one for one in (best, held)}, (best,), {})
     assert is_settled_if_held(rounds, found) == is_settled
     assert asked == [(best, {("coulomb_friction",), (), ("hysteresis",)})]
+
+
+@pytest.mark.parametrize(
+    ("left", "plain", "grown_to"),
+    [
+        # Play that is far behind the best set, or beside one that leaves nothing, is not
+        # worth its time.
+        (130.0, made_up(("input_delay",), 150.0), 100.5),
+        (9000.0, made_up(("input_delay",), 150.0), None),
+        (130.0, made_up(("input_delay",), 100.0, whiteness=0.9), None),
+    ],
+)
+def test_play_that_ended_beside_a_line_grows_anew_beside_a_held_command(
+    monkeypatch, left, plain, grown_to
+):
+    play = made_up(("gear_backlash",), left)
+    grown = made_up(("gear_backlash",), 100.5)
+    asked = []
+
+    def task(held, one, *, to_the_end):
+        asked.append((held.problem, one, to_the_end))
+        return grown
+
+    monkeypatch.setattr(held_command, "growing_task", task)
+    rounds = SimpleNamespace(
+        criteria=CRITERIA,
+        problem="held",
+        on_round=lambda what, n: None,
+        run_tasks=lambda tasks, keep: tasks,
+    )
+    found = held_command._grown(rounds, [play, plain])
+    assert found == ([] if grown_to is None else [grown])
+    assert asked == ([] if grown_to is None else [("held", play, False)])

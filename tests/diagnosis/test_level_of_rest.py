@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.problem import prepare, with_level_of_rest
+from hwid_cli.diagnosis.problem import Signals, prepare, with_level_of_rest
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -44,6 +44,24 @@ def test_a_slow_rise_is_met_better_than_by_its_first_sample(slope):
         for seed in range(60)
     ]
     assert np.sqrt(np.mean(np.square(errors))) < 1.02 * NOISE
+
+
+def resting_at(output, input_A=None):
+    command = np.full(N, 2.0) if input_A is None else input_A
+    signals = Signals("r", "step", command, output, command, output, STEP)
+    return signals.rest_position_m
+
+
+def test_a_free_axis_under_an_input_that_is_there_at_once_rests_at_its_first_samples():
+    way = 0.3 + 4.0 * (STEP * np.arange(N)) ** 2
+    errors = [resting_at(way + 1e-4 * noise_of(seed) / NOISE) - 0.3 for seed in range(9)]
+    assert np.max(np.abs(errors)) < 4e-4
+
+
+def test_an_axis_that_rests_does_so_at_the_mean_of_its_rest():
+    way, command = 0.3 + 0.0 * np.arange(N), step_after(N // 2)
+    errors = [resting_at(way + noise_of(seed), command) - 0.3 for seed in range(200)]
+    assert np.median(np.abs(errors)) < NOISE / 15
 
 
 def test_friction_keeps_no_displacement_that_is_noise():

@@ -1125,6 +1125,17 @@ def test_little_is_near_the_noise_and_next_to_nothing_of_the_gap(left, of, is_li
     assert CRITERIA.leaves_next_to_nothing(made_up(GOOD, left), base(of)) is is_little
 
 
+@pytest.mark.parametrize(
+    ("left", "of", "is_nothing"),
+    [(104.0, 9000.0, True), (104.0, 400.0, False), (110.0, 90_000.0, False)],
+)
+def test_what_drowns_in_the_noise_and_is_a_small_part_calls_for_nothing_more(
+    left, of, is_nothing
+):
+    found = made_up(GOOD, left)
+    assert CRITERIA.leaves_nothing_of_account(found, base(of)) is is_nothing
+
+
 def test_two_changes_of_parameters_are_told_apart_by_what_changes():
     pair = [
         made_up((f"parameter_change:{which}",), 1.0) for which in ("mass", "damping")
