@@ -19,7 +19,12 @@ from hwid_cli.config.simulation_checks import (
 )
 from hwid_cli.data.units import factor_between, is_unitless, quantity_of
 from hwid_cli.files.messages import name_fault
-from hwid_cli.records.experiment import Experiment, NextOptions, RecordingsOptions
+from hwid_cli.records.experiment import (
+    MOST_PAIRS,
+    Experiment,
+    NextOptions,
+    RecordingsOptions,
+)
 from hwid_cli.records.model import LinearBlock, Orders
 
 # Lists of recordings that may not hold a test recording, and what they do with it.
@@ -227,6 +232,15 @@ def _cut_or_parts(experiment: Experiment) -> Iterator[Fault]:
 
 def _delay_grid(experiment: Experiment) -> Iterator[Fault]:
     options = experiment.orders
+    pairs = len(options.nb) * len(options.nk)
+    if pairs > MOST_PAIRS:
+        yield Fault(
+            ("orders",),
+            f"found {len(options.nb)} values of nb and {len(options.nk)} of nk, "
+            f"{pairs} pairs",
+            f"at most {MOST_PAIRS}",
+            "narrow the ranges, or list fewer values, as nb: [1, 2, 5, 10, 20]",
+        )
     if options.nk_role == "delay" and options.nf is None:
         yield missing(("orders", "nf"), "the number of poles, because nk_role is delay")
     if options.nk_role != "delay" and options.nf is not None:

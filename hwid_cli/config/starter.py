@@ -417,8 +417,18 @@ def _group_lines(proposal: Proposal) -> list[str]:
 def _next_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     """Limits of what may be recorded next: what the recordings have reached."""
     unit = _si_unit(layout.input) or "unit of the input"
+    around = proposal.reached.level
     lines = (
-        ("amplitude", proposal.reached.largest, unit),
+        *(
+            (("level", around, f"{unit}, where the inputs begin and end"),)
+            if around
+            else ()
+        ),
+        (
+            "amplitude",
+            proposal.reached.largest,
+            f"{unit}, about it" if around else unit,
+        ),
         ("rate", proposal.reached.fastest, f"{unit} per second"),
         ("duration_s", proposal.reached.longest_s, "s"),
     )

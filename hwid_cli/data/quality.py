@@ -67,8 +67,8 @@ def quality_notes(values: np.ndarray, *, may_hold: bool = False) -> tuple[str, .
     spread, middle = float(np.std(values)), abs(float(np.mean(values)))
     if middle > _FAR * spread > 0.0:
         notes.append(
-            f"{middle / spread:.3g} standard deviations from zero: take the offset off, "
-            "fits with few kinds of maps may miss it"
+            f"{middle / spread:.3g} standard deviations from zero: models with a "
+            "piecewise linear or polynomial map keep that, those without a map do not"
         )
     wraps = _count_wraps(values)
     if wraps and not may_hold:

@@ -9,7 +9,7 @@ from math import inf
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import rebuilt
+from hwid_cli.diagnosis.candidate import belongs_to, rebuilt
 from hwid_cli.diagnosis.parameters import (
     BASE,
     ParameterLayout,
@@ -58,7 +58,8 @@ def unclear_effects(
     tuple of str
         Ids in the catalogue. What each recording has for itself has no interval.
     """
-    if not found.is_usable:
+    # A fit beside a stand-in without a spring has starts that one with a spring has not.
+    if not found.is_usable or not belongs_to(problem, found, scales):
         return found.effects
     fit_layout, point = rebuilt(problem, found, scales)
     of_all = _spread(problem, found, fit_layout, point)

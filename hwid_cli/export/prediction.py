@@ -77,8 +77,9 @@ def read_input(
     source = source or InputSource()
     columns, scale = _named_in(exported.card.columns, source), 1.0
     time_column, input_column = PROPOSED_COLUMNS
-    is_other = source == InputSource() and columns.input != input_column
-    if is_other and _is_proposed(path):
+    asked = source in (InputSource(), InputSource(input=input_column))
+    is_other = _named_in(exported.card.columns, InputSource()).input != input_column
+    if asked and is_other and _is_proposed(path):
         # As `hwid next` writes it: in the unit that the model takes.
         columns = Columns(input=input_column, output=input_column, time=time_column)
         scale = exported.card.input_scale

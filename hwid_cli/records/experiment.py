@@ -47,6 +47,8 @@ KEEP_RULES = ("top", "best", "coverage_at_least")
 KNOWN_TOLERANCE = 0.02
 # Far beyond any use: grids of the literature end at 20 orders, maps at 100 units.
 _MOST_ORDER = 1000
+# Pairs of orders in one grid: 50 by 50, 25 times the published one.
+MOST_PAIRS = 2500
 
 _COLUMN = Integer(least=0, words="a number >= 0")
 _PATTERN = Each(bool, "a file name or pattern")
@@ -232,13 +234,17 @@ class NextLimits:
     Parameters
     ----------
     one_sided : bool
-        Whether the input has the sign of the recorded ones only, as a heater's power.
+        Whether the input stays on the recorded ones' side of the level, as a heater's
+        power.
+    level : float
+        Where it begins and ends, as at a valve's operating point.
     """
 
     amplitude: Annotated[float, POSITIVE]
     rate: Annotated[float, POSITIVE]
     duration_s: Annotated[float, POSITIVE]
     one_sided: bool = False
+    level: Annotated[float, Number()] = 0.0
 
 
 @dataclass(frozen=True)

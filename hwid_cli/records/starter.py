@@ -128,11 +128,15 @@ class Reached:
 
     Parameters
     ----------
+    level : float, [input unit]
+        That the machine works around; 0 where the inputs come near zero.
     largest : float, [input unit]
+        About that.
     fastest : float, [input unit/s]
     longest_s : float, [s]
     """
 
+    level: float
     largest: float
     fastest: float
     longest_s: float

@@ -33,7 +33,9 @@ def recordings_table(facts: Sequence[RecordingFacts]) -> Table:
         *texts("recording", "kind"),
         *numbers("samples", "used", "step [s]", "input", "output"),
     )
-    caption = f"{counted(len(facts), 'recording')} (used: after calibration)"
+    caption = (
+        f"{counted(len(facts), 'recording')} as read (used: samples after calibration)"
+    )
     notes = tuple(f"{one.name}: {note}" for one in facts for note in one.notes)
     return Table(caption, columns, rows, notes)
 

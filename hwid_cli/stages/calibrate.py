@@ -33,8 +33,10 @@ from hwid_cli.records.recordings import (
     Recording,
 )
 from hwid_cli.report.calibration import calibration_table
+from hwid_cli.report.formats import listed
 from hwid_cli.report.sections.calibrate import drawings_of
 from hwid_cli.stages.fit_seconds import counted
+from hwid_cli.stages.proposed_starts import levels_taken_off
 from hwid_cli.stages.selection import named_recordings, select_recordings
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
 from hwid_cli.store.result_files import Provenance
@@ -286,13 +288,25 @@ def _changed(given: Measured, result: Calibrated) -> str:
 
 
 def _warnings(context: Context, given: Measured) -> list[str]:
-    """Recordings that seem to have gone wrong."""
+    """Recordings that seem to have gone wrong, and levels that a recipe takes off."""
     source = str(context.experiment.source)
-    return [
-        f"{source}: recordings: {name}: {said}"
+    said = [
+        f"{source}: recordings: {name}: {doubt}"
         for name, several in doubts(given.recordings).items()
-        for said in several
+        for doubt in several
     ]
+    if given.options is None:
+        return said
+    recipes = {one.kind: getattr(given.options, one.kind) for one in given.recordings}
+    held = levels_taken_off(given.recordings, recipes)
+    if held:
+        said.append(
+            f"{source}: calibrate: output_offset takes off the level at which the input "
+            f"holds the output of {listed([one.name for one in held])}, another one in "
+            "each; models do not know that level then: take output_offset out, or add "
+            "input_offset"
+        )
+    return said
 
 
 def _plan(planning: Planning) -> tuple[StagePlan, ...]:

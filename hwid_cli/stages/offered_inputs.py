@@ -14,13 +14,23 @@ import numpy as np
 
 from hwid_cli.data.recording_plan import read_plan
 from hwid_cli.errors import ConfigError
-from hwid_cli.records.experiment import Experiment, NextOptions, RecordingsOptions
+from hwid_cli.records.experiment import (
+    Experiment,
+    NextLimits,
+    NextOptions,
+    RecordingsOptions,
+)
 from hwid_cli.records.next import PlannedInput
 from hwid_cli.records.recordings import Recording
 from hwid_cli.records.units import behind
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.output_range import in_words
-from hwid_cli.trust.designs import LEAST_SAMPLES, designs
+from hwid_cli.trust.designs import (
+    LEAST_SAMPLES,
+    around_level,
+    designs,
+    working_level,
+)
 from hwid_cli.trust.repeats import is_as_planned
 
 # Times the range of all recorded outputs that a range of the output is questioned beyond.
@@ -70,7 +80,7 @@ def offered_inputs(
         limits.duration_s,
         first.sample_time_s,
         first.input_unit,
-        side=_usual_sign(recordings) if limits.one_sided else 0,
+        side=_usual_side(recordings, limits.level) if limits.one_sided else 0,
     )
     if not found:
         least = LEAST_SAMPLES * first.sample_time_s
@@ -81,7 +91,9 @@ def offered_inputs(
             "which no input fits; expected a twentieth of the amplitude to be reached "
             f"within the duration, and at least {least:g} s; raise rate or duration_s"
         )
-    return _under_own_names(found, recordings)
+    return _under_own_names(
+        around_level(found, limits.level, first.input_unit), recordings
+    )
 
 
 def _under_own_names(
@@ -106,11 +118,11 @@ def _under_own_names(
     return tuple(found)
 
 
-def _usual_sign(recordings: Sequence[Recording]) -> int:
-    """Sign of the largest input."""
+def _usual_side(recordings: Sequence[Recording], level: float) -> int:
+    """On which side of a level the inputs go farther."""
     lowest = min(float(one.input.min()) for one in recordings)
     highest = max(float(one.input.max()) for one in recordings)
-    return 1 if highest >= -lowest else -1
+    return 1 if highest - level >= level - lowest else -1
 
 
 def odd_inputs(
@@ -132,19 +144,34 @@ def odd_inputs(
     said = _other_inputs(plan)
     said += _far_outside(recordings, [one for one in plan if one.name not in known])
     said += _wide_range(options, recordings)
-    limits = options.limits
-    if limits is None or limits.one_sided:
-        return said
-    sign = _usual_sign(recordings)
-    largest = max(float((sign * one.input).max()) for one in recordings)
-    lowest = min(float((sign * one.input).min()) for one in recordings)
-    if lowest < -_OTHER_SIDE * largest:
-        return said
-    word = "negative" if sign > 0 else "positive"
+    if options.limits is not None:
+        said += _where_nothing_was(options.limits, recordings, source)
+    return said
+
+
+def _where_nothing_was(
+    limits: NextLimits, recordings: Sequence[Recording], source: str
+) -> list[str]:
+    """That designed inputs go where the input of no recording was near, if so."""
+    inputs, unit = [one.input for one in recordings], behind(recordings[0].input_unit)
+    level = working_level(inputs)
+    if level != 0.0 and limits.level == 0.0:
+        return [
+            f"recordings begin at {level:.3g}{unit}, and none comes near 0, where designed "
+            f"ones begin and end: put level: {level:.3g} into next.limits of {source} if "
+            "the machine works around that"
+        ]
+    # Towards the side where the recordings were.
+    side = _usual_side(recordings, 0.0)
+    farthest = max(float((side * one).max()) for one in inputs)
+    nearest = min(float((side * one).min()) for one in inputs)
+    stays = limits.one_sided or side * limits.level >= limits.amplitude
+    if stays or nearest < -_OTHER_SIDE * farthest:
+        return []
+    word = "negative" if side > 0 else "positive"
     return [
-        *said,
         f"no recording has a {word} input, but designed ones may: where there is none, "
-        f"as of a heater, put one_sided: true into next.limits of {source}",
+        f"as of a heater, put one_sided: true into next.limits of {source}"
     ]
 
 

@@ -1,5 +1,7 @@
 """Which candidate orders to try."""
 
+import numpy as np
+
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import Fit, Orders
@@ -61,18 +63,18 @@ def growth(
     (((0, ()),), ((1, (0,)), (2, (0,))), ((3, (1, 2)),))
     """
     grid = [orders for _, _, orders in candidate_orders(options)]
-    smaller = [
-        [j for j, other in enumerate(grid) if i != j and orders.contains(other)]
-        for i, orders in enumerate(grid)
-    ]
+    contains = np.array([[one.contains(other) for other in grid] for one in grid])
+    np.fill_diagonal(contains, False)
+    # What is contained through a third one is not among the largest.
+    within = contains.astype(np.float32)
+    largest = contains & ~(within @ within > 0.0)
     rounds: dict[int, list[tuple[int, tuple[int, ...]]]] = {}
-    depth: dict[int, int] = {}
-    for i in sorted(range(len(grid)), key=lambda place: len(smaller[place])):
-        largest = [
-            j for j in smaller[i] if not any(j in smaller[k] for k in smaller[i])
-        ]
-        depth[i] = 1 + max((depth[j] for j in largest), default=-1)
-        rounds.setdefault(depth[i], []).append((i, tuple(largest)))
+    depth = np.zeros(len(grid), dtype=int)
+    for i in np.argsort(contains.sum(axis=1), kind="stable"):
+        before = np.flatnonzero(largest[i])
+        depth[i] = 1 + max(depth[before], default=-1)
+        place = (int(i), tuple(int(one) for one in before))
+        rounds.setdefault(int(depth[i]), []).append(place)
     return tuple(tuple(sorted(rounds[number])) for number in sorted(rounds))
 
 

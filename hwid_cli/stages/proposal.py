@@ -26,6 +26,7 @@ from hwid_cli.stages.proposed_starts import (
     start_of_fits,
     swing_of,
 )
+from hwid_cli.trust.designs import working_level
 
 # Words in file names, German and English; the first kind that has one of them is it.
 _KIND_WORDS = {
@@ -205,15 +206,16 @@ def _alike_in_families(kinds: dict[str, str]) -> dict[str, str]:
 
 
 def _reached(raws: Sequence[RawRecording]) -> Reached:
-    """Largest value, steepest slope and length of the inputs."""
-    inputs = [raw.input for raw in raws]
+    """Level, largest value about it, steepest slope and length of the inputs."""
+    level = working_level([raw.input for raw in raws])
+    inputs = [raw.input - level for raw in raws]
     slopes = [np.diff(raw.input) / raw.sample_time_s for raw in raws]
     largest, fastest = (
         max(float(np.nanmax(np.abs(one), initial=0.0)) for one in signals)
         for signals in (inputs, slopes)
     )
     longest_s = max(raw.input.size * raw.sample_time_s for raw in raws)
-    return Reached(largest, fastest, longest_s)
+    return Reached(level, largest, fastest, longest_s)
 
 
 def _kind_of_signal(values: np.ndarray) -> str:

@@ -44,6 +44,40 @@ def rests_at_operating_points(raws: Sequence[RawRecording]) -> bool:
     return bool(is_held.any()) and _rest_where_the_input_says(raws, {}, kinds)
 
 
+def levels_taken_off(
+    raws: Sequence[RawRecording], recipes: Mapping[str, tuple[str, ...]]
+) -> list[RawRecording]:
+    """Recordings that lose the level at which their input holds the output.
+
+    Their recipe subtracts that of the output alone, they rest at several levels of the
+    input, and equal ones go with equal outputs: a model of what is left does not know
+    where the machine stands.
+
+    Parameters
+    ----------
+    recipes : mapping of str to tuple of str
+        Steps of calibration of each kind.
+    """
+    own = [
+        raw
+        for raw in raws
+        if "output_offset" in recipes[raw.kind]
+        and "input_offset" not in recipes[raw.kind]
+        and begins_at_rest(raw)
+    ]
+    if not own or not rests_at_operating_points(own):
+        return []
+    inputs, outputs = np.array([_rest_levels(raw) for raw in own]).T
+    several = all(
+        np.ptp(levels) > ALIKE_LEVELS * swing_of(signals)
+        for levels, signals in (
+            (inputs, [raw.input for raw in own]),
+            (outputs, [raw.output for raw in own]),
+        )
+    )
+    return own if several else []
+
+
 def rests_anywhere(raws: Sequence[RawRecording]) -> bool:
     """Whether one level of the input goes with several levels of the output."""
     inputs = np.array([_rest_levels(raw)[0] for raw in raws])

@@ -1,12 +1,13 @@
 """Inputs to be played, designed within the limits of a drive.
 
 Steps that are held and taken back, staircases of held levels, multisines over two decades
-of bands, and sweeps. All begin and end at rest at zero, none exceeds the amplitude, and
-none moves faster than the rate: a step becomes a ramp, a multisine smaller, and a sweep
+of bands, and sweeps. All begin and end at rest at zero, or at another level that the
+machine works around; none exceeds the amplitude about it, and none moves faster than the rate: a step becomes a ramp, a multisine smaller, and a sweep
 ends at the frequency whose steepest slope is the rate.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,6 +22,9 @@ _SIZES = (1.0, 0.5, 0.2)
 # Lines of a multisine, and highest frequency of any design as a share of Nyquist's: at a
 # tenth of the sample rate recordings show a sine well.
 _LINES, _HIGHEST = 20, 0.2
+# Share of their range by which inputs stay away from zero, where machines work around
+# another level.
+_AWAY = 0.05
 # Held levels in a recording.
 _LEVELS = (8, 25, 70)
 
@@ -58,6 +62,55 @@ def designs(
     found = [one for make in makers for one in make(limits)]
     least = LEAST_SHARE * amplitude
     return tuple(one for one in found if np.abs(one.values).max() >= least)
+
+
+def working_level(inputs: Sequence[np.ndarray]) -> float:
+    """Level that a machine works around: 0 unless inputs stay away from it.
+
+    Parameters
+    ----------
+    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+        Of recordings; not a number where a sample is missing.
+
+    Returns
+    -------
+    float, [input unit]
+        Median of where they begin.
+
+    Examples
+    --------
+    >>> working_level([np.array([12.0, 5.0, 18.0]), np.array([12.0, 19.0])])
+    12.0
+    >>> working_level([np.array([0.0, 5.0, 18.0]), np.array([12.0, 19.0])])
+    0.0
+    """
+    lowest = min(float(np.nanmin(one)) for one in inputs)
+    highest = max(float(np.nanmax(one)) for one in inputs)
+    if max(lowest, -highest) <= _AWAY * (highest - lowest):
+        return 0.0
+    return float(np.median([one[np.isfinite(one)][0] for one in inputs]))
+
+
+def around_level(
+    found: Sequence[PlannedInput], level: float, unit: str
+) -> tuple[PlannedInput, ...]:
+    """Inputs that begin and end at a level.
+
+    Parameters
+    ----------
+    found : sequence of PlannedInput
+        About zero.
+    level : float, [unit]
+    unit : str
+        Of the input, for words.
+    """
+    if level == 0.0:
+        return tuple(found)
+    words = f"around {level:.3g}{behind(unit)}"
+    return tuple(
+        replace(one, values=one.values + level, words=f"{one.words}, {words}")
+        for one in found
+    )
 
 
 @dataclass(frozen=True)

@@ -120,6 +120,13 @@ VALUES = [
     _case(
         "10^9 orders", key("nb: [1, 2]", "nb: [1, 1000000000]"), "orders.nb", "<= 1000"
     ),
+    _case(
+        "10^5 pairs of orders",
+        key("nb: [1, 2], nk: [1, 2]", "nb: [1, 300], nk: [1, 400]"),
+        "orders",
+        "120000 pairs",
+        "at most 2500",
+    ),
     _case("orders back", key("nb: [1, 2]", "nb: [2, 1]"), "[2, 1]", "write [1, 2]"),
     _case("no orders", key("nb: [1, 2]", "nb: []"), "orders.nb", "at least one order"),
     _case("an order twice", key("nb: [1, 2]", "nb: [1, 2, 2]"), "2 is listed twice"),

@@ -89,6 +89,30 @@ def test_a_sign_that_no_recording_has_had_is_asked_about(bench):
     assert max(played(bench, row)[:, 1].max() for row in proposals(bench)) > 1.5
 
 
+def test_a_machine_that_works_around_a_level_is_asked_about_it(tmp_path):
+    """A valve of 4 to 20 mA: 0 mA is a broken wire."""
+    u = np.full(N, 12.0)
+    u[N // 20 :] = 15.0
+    measure(tmp_path / "raw", "small_step", u)
+    limits = LIMITS.replace("amplitude: 2.0", "amplitude: 7.0")
+    plain = run(tmp_path, limits)
+    assert "put level: 12 into next.limits" in flat(plain.stderr)
+
+    around = run(tmp_path, limits.replace("amplitude", "level: 12, amplitude"))
+    assert "into next.limits" not in around.stderr
+    inputs = [played(tmp_path, row)[:, 1] for row in proposals(tmp_path)]
+    assert all(one[0] == one[-1] == 12.0 for one in inputs)
+    assert 5.0 <= min(one.min() for one in inputs) < 7.0
+    assert 17.0 < max(one.max() for one in inputs) <= 19.0
+
+    one = run(
+        tmp_path, limits.replace("amplitude", "level: 12, one_sided: true, amplitude")
+    )
+    assert "into next.limits" not in one.stderr
+    inputs = [played(tmp_path, row)[:, 1] for row in proposals(tmp_path)]
+    assert min(one.min() for one in inputs) == 12.0
+
+
 @pytest.mark.thorough
 def test_the_loop_takes_up_what_was_recorded_and_ends(bench):
     said = run(bench, LIMITS.replace("next: {", "next: {enough: 0.1, "))

@@ -49,7 +49,7 @@ def test_damaged_samples_are_counted():
 
 def test_a_signal_far_from_zero_is_named():
     (note,) = quality_notes(293.0 + 0.5 * WAVE)
-    assert "standard deviations from zero: take the offset off" in note
+    assert "standard deviations from zero: models with" in note
     assert quality_notes(3.0 + WAVE) == ()
 
 

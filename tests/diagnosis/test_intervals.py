@@ -13,6 +13,7 @@ from hwid_cli.diagnosis.intervals import (
     soft_stops,
     unclear_effects,
 )
+from hwid_cli.diagnosis.parameters import START
 from hwid_cli.records.candidates import ParameterRef
 from tests.diagnosis.made_up_fits import made_up
 from tests.diagnosis.small_drive import fit, problem, recordings, sizes
@@ -54,6 +55,18 @@ def test_what_the_simulation_has_of_a_law_shares_its_strength_in_any_way(true, u
     found = fit(given, {"stribeck_friction": start}, scales=scales)
 
     assert unclear_effects(given, found, scales) == unclear
+
+
+def test_a_fit_whose_recordings_had_starts_of_their_own_is_left_open_where_they_have_none():
+    given = problem(recordings({"coulomb_friction": {"force_N": 0.8}}))
+    scales = sizes(problem())
+    found = fit(given, {"coulomb_friction": {"force_N": 0.7}}, scales=scales)
+    assert unclear_effects(given, found, scales) == ()
+    place = ParameterRef(START, "position")
+    beside_free_axis = replace(
+        found, own_names=(place,), own=np.zeros((len(given.signals), 1))
+    )
+    assert unclear_effects(given, beside_free_axis, scales) == found.effects
 
 
 CONTACT = "one_sided_stop:contact"

@@ -54,7 +54,9 @@ def resting_at(output, input_A=None):
 
 def test_a_free_axis_under_an_input_that_is_there_at_once_rests_at_its_first_samples():
     way = 0.3 + 4.0 * (STEP * np.arange(N)) ** 2
-    errors = [resting_at(way + 1e-4 * noise_of(seed) / NOISE) - 0.3 for seed in range(9)]
+    errors = [
+        resting_at(way + 1e-4 * noise_of(seed) / NOISE) - 0.3 for seed in range(9)
+    ]
     assert np.max(np.abs(errors)) < 4e-4
 
 

@@ -3,7 +3,7 @@ import pytest
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.experiment import OrdersOptions
 from hwid_cli.records.model import Orders
-from hwid_cli.stages.order_grid import candidate_orders
+from hwid_cli.stages.order_grid import candidate_orders, growth
 
 
 def test_the_default_grid_is_the_published_one():
@@ -29,3 +29,37 @@ def test_in_the_delay_reading_the_second_axis_is_the_delay():
 def test_the_delay_reading_needs_the_number_of_poles():
     with pytest.raises(ConfigError, match=r"orders\.nf: missing"):
         candidate_orders(OrdersOptions(nk_role="delay"))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        OrdersOptions(),
+        OrdersOptions(nb=(3, 1), nk=(2, 7, 1)),
+        OrdersOptions(nb=(2, 3, 4), nk=(0, 1, 2, 5), nk_role="delay", nf=3),
+    ],
+)
+def test_models_grow_out_of_the_largest_ones_that_they_contain(options):
+    grid = [one for _, _, one in candidate_orders(options)]
+    rounds = growth(options)
+    assert sorted(place for one in rounds for place, _ in one) == list(range(len(grid)))
+    done = set()
+    for places in rounds:
+        for place, largest in places:
+            below = {
+                j
+                for j, one in enumerate(grid)
+                if j != place and grid[place].contains(one)
+            }
+            assert set(largest) == {
+                j
+                for j in below
+                if not any(grid[k].contains(grid[j]) for k in below - {j})
+            }
+            assert below <= done
+        done |= {place for place, _ in places}
+
+
+def test_a_wide_grid_is_put_in_order_at_once():
+    rounds = growth(OrdersOptions(nb=tuple(range(1, 51)), nk=tuple(range(1, 51))))
+    assert (len(rounds), sum(map(len, rounds))) == (99, 2500)

@@ -6,6 +6,7 @@ from scipy.signal import lfilter
 
 from hwid_cli.records.recordings import RawRecording
 from hwid_cli.stages.proposal import propose
+from hwid_cli.stages.proposed_starts import levels_taken_off
 
 REST, N = 100, 900
 
@@ -106,3 +107,28 @@ def test_a_level_that_goes_with_the_input_is_not_subtracted(before, offset, step
         )
     ]
     assert recipe(*raws) == steps
+
+
+@pytest.mark.parametrize(
+    ("recipe", "before", "offset", "is_taken_off"),
+    [
+        (("cut", "output_offset"), (1.0, 2.0), (0.0, 0.0), True),
+        # Both levels go, or none; all rest at one; the zero of a sensor.
+        (("cut", "output_offset", "input_offset"), (1.0, 2.0), (0.0, 0.0), False),
+        (("cut",), (1.0, 2.0), (0.0, 0.0), False),
+        (("cut", "output_offset"), (1.0, 1.0), (0.0, 0.0), False),
+        (("cut", "output_offset"), (0.0, 0.0), (0.0, 20.0), False),
+        (("cut", "output_offset"), (1.0, 1.0), (0.0, 0.8), False),
+    ],
+)
+def test_a_recipe_that_takes_off_where_an_input_holds_the_output(
+    recipe, before, offset, is_taken_off
+):
+    raws = [
+        settled(f"step_{name}", height, before=level, offset=shift, seed=seed)
+        for seed, (name, height, level, shift) in enumerate(
+            zip("ab", (3.0, 0.5), before, offset, strict=True)
+        )
+    ]
+    recipes = {one.kind: recipe for one in raws}
+    assert levels_taken_off(raws, recipes) == (raws if is_taken_off else [])

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hwid_cli.trust.designs import designs
+from hwid_cli.trust.designs import around_level, designs, working_level
 
 
 @pytest.mark.thorough
@@ -87,3 +87,32 @@ def test_every_call_makes_the_same_inputs():
 
     for one, other in zip(first, second, strict=True):
         assert np.array_equal(one.values, other.values)
+
+
+def test_inputs_around_a_level_begin_and_end_there_and_move_as_those_around_zero():
+    plain = designs(6.0, 50.0, 7.5, 1e-3, "mA")
+    moved = around_level(plain, 12.0, "mA")
+    assert [one.name for one in moved] == [one.name for one in plain]
+    for one, other in zip(plain, moved, strict=True):
+        assert other.values[0] == other.values[-1] == 12.0
+        assert np.allclose(other.values - 12.0, one.values)
+        assert other.words.endswith("around 12 mA")
+    assert min(one.values.min() for one in moved) == pytest.approx(6.0)
+    assert around_level(plain, 0.0, "mA") == plain
+
+
+@pytest.mark.parametrize(
+    ("inputs", "level"),
+    [
+        ([[12.0, 5.0, 18.0], [12.5, 19.0], [np.nan, 13.0]], 12.5),
+        ([[-12.0, -5.0], [-12.0, -18.0]], -12.0),
+        # A heater that is off at times, a drive, and a noisy zero.
+        ([[12.0, 0.1, 18.0]], 0.0),
+        ([[1.0, -2.0]], 0.0),
+        ([[0.01, 3.0]], 0.0),
+    ],
+)
+def test_what_a_machine_works_around_is_where_inputs_begin_that_stay_away_from_zero(
+    inputs, level
+):
+    assert working_level([np.array(one) for one in inputs]) == level
