@@ -46,6 +46,9 @@ class SelectionEvidence:
         input is beyond what the model has seen.
     n_outliers : int, [samples]
         Of the validation recordings, that do not count because the fits bear outliers too.
+    output_spread : float, [output unit]
+        Standard deviation of the validation recordings' outputs, geometric mean as of the
+        RMSD; infinite in results of versions before it was looked at.
     """
 
     rmsd: float
@@ -55,6 +58,12 @@ class SelectionEvidence:
     n_validation: int
     n_unexcited: int = 0
     n_outliers: int = 0
+    output_spread: float = float("inf")
+
+    @property
+    def predicts(self) -> bool:
+        """Whether the best candidate says more of other recordings than their mean does."""
+        return self.best_rmsd < self.output_spread
 
 
 @dataclass(frozen=True)

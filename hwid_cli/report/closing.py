@@ -14,7 +14,7 @@ from hwid_cli.records.order import MapAdvice, OrderAdvice
 from hwid_cli.report.final_test import joining_clause
 from hwid_cli.report.formats import counted, listed, share_text, with_unit
 from hwid_cli.report.map_words import fit_keys, map_words
-from hwid_cli.report.orders import axes_to_widen, delay_keys
+from hwid_cli.report.orders import axes_to_widen, delay_keys, no_choice
 
 # Room for the words on the left, [characters].
 _LABELS = 12
@@ -266,8 +266,8 @@ def why_other_orders(name: str, own: tuple[int, int], advised: tuple[int, int]) 
     if own == advised:
         return ""
     return (
-        f"{name} has {own[0]}/{own[1]}, chosen by other recordings; those are as good as any "
-        "on average"
+        f"{name} has {own[0]}/{own[1]}, which other recordings chose for it; the advice is "
+        "an average over models of one recording"
     )
 
 
@@ -281,13 +281,15 @@ def orders_sentence(
     best : BestModel or None
         The model that stands beside them.
     """
+    if reason := no_choice(orders.overall.evidence, orders.unit):
+        return f"none recommended: {reason}"
     said = f"nb = {orders.overall.nb}, nk = {orders.overall.nk}"
-    if maps is not None:
+    if maps is not None and maps.evidence.predicts:
         pair = (maps.chosen.input_map, maps.chosen.output_map)
         named = " and ".join(one.replace("_", " ") for one in pair)
         said += ", no maps" if set(pair) == {"none"} else f", maps {named}"
     said += " recommended (hwid order says why)"
-    if maps is not None and maps.chosen != maps.given:
+    if maps is not None and maps.evidence.predicts and maps.chosen != maps.given:
         said += f": put {fit_keys(maps.chosen)} into fit"
     axes = axes_to_widen(orders, orders.overall.nb, orders.overall.nk)
     if delays := orders.further_delays:

@@ -9,6 +9,7 @@ from hwid_cli.records.order import (
     OrderChoice,
     SelectionEvidence,
 )
+from hwid_cli.records.units import behind
 from hwid_cli.report.formats import MISSING, counted, decimals, number
 from hwid_cli.report.map_words import fit_keys, map_words
 from hwid_cli.report.table import Table, Text, numbers, texts
@@ -55,6 +56,18 @@ def _reason_to_take(
     )
 
 
+def no_choice(evidence: SelectionEvidence, unit: str) -> str:
+    """Say that candidates are all too bad for a choice; empty where they are not."""
+    if evidence.predicts:
+        return ""
+    return (
+        "no model of one recording predicts the others: the best are off by "
+        f"{evidence.best_rmsd:.3g}{behind(unit)}, where outputs vary by "
+        f"{evidence.output_spread:.3g}{behind(unit)}. Models of several recordings "
+        "together (group: {max_level: 1, together: true}) choose their own"
+    )
+
+
 def _left_out(evidence: SelectionEvidence) -> tuple[str, ...]:
     """Say which pairs of model and recording, and which samples, the selection leaves out."""
     found = []
@@ -91,7 +104,7 @@ def map_table(advice: MapAdvice) -> Table:
     )
     nb, nf, nk = advice.orders
     caption = (
-        f"Maps at the orders [{nb} {nf} {nk}], with p parameters: cross-validated RMSD "
+        f"Maps of models of one recording at the orders [{nb} {nf} {nk}], with p parameters: cross-validated RMSD "
         f"[{advice.unit}] (geometric mean), factor above the best (ten at most on one "
         f"recording), BIC above the lowest; {len(rows)} of {len(advice.candidates)} pairs"
     )
@@ -109,6 +122,8 @@ def map_reasons(advice: MapAdvice) -> tuple[Text, ...]:
 
 def _map_recommendation(advice: MapAdvice) -> str:
     one, best = advice.chosen, advice.candidates[0]
+    if reason := no_choice(advice.evidence, advice.unit):
+        return f"These maps are no choice: {reason}."
     take = f"Put {fit_keys(one)} into fit: "
     if not advice.evidence.n_validation:
         return (
@@ -132,7 +147,7 @@ def _map_recommendation(advice: MapAdvice) -> str:
 
 
 def _mark(one: MapCandidate, advice: MapAdvice) -> str:
-    if one == advice.chosen:
+    if one == advice.chosen and advice.evidence.predicts:
         return "take"
     return "yours" if one == advice.given else ""
 
@@ -195,6 +210,8 @@ def _orders(nb: int, nk: int, advice: OrderAdvice) -> str:
 
 def _recommendation(advice: OrderAdvice) -> str:
     one = advice.overall
+    if reason := no_choice(one.evidence, advice.unit):
+        return f"These orders are no choice: {reason}."
     take = f"Take nb = {one.nb}, nk = {one.nk} (orders {_orders(one.nb, one.nk, advice)}): "
     if not one.evidence.n_validation:
         return (

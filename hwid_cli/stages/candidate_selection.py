@@ -41,6 +41,8 @@ class ScoredCandidates:
         Pairs that do not count, because most of the input is beyond what the model has seen.
     n_outliers : int, [samples]
         In the validation recordings, that do not count.
+    spreads : ndarray, shape (n_pairs,), [output unit]
+        Standard deviations of the validation recordings' outputs.
     """
 
     factors: np.ndarray
@@ -48,6 +50,7 @@ class ScoredCandidates:
     validation: np.ndarray
     n_unexcited: int
     n_outliers: int
+    spreads: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +99,7 @@ def scored(
         what the models have seen, all count.
     """
     inputs = {one.name: one.input for one in recordings}
+    outputs = {one.name: one.output for one in recordings}
     others = _known_pairs(rmsd, identified_on, validated_on, is_own=False)
     pairs = [
         (place, other)
@@ -115,7 +119,10 @@ def scored(
     validation = np.array([-1 if is_alone else other for _, other in pairs])
     n_unexcited = max(len(others) - len(pairs), 0)
     counts = [n_outliers[one] for one in {other for _, other in pairs} if n_outliers]
-    return ScoredCandidates(factors, values, validation, n_unexcited, sum(counts))
+    spreads = np.array([outputs[validated_on[other]].std() for _, other in pairs])
+    return ScoredCandidates(
+        factors, values, validation, n_unexcited, sum(counts), spreads
+    )
 
 
 def smallest_good(
@@ -156,6 +163,7 @@ def smallest_good(
         n_validation=int(np.sum(names >= 0)),
         n_unexcited=found.n_unexcited,
         n_outliers=found.n_outliers,
+        output_spread=_typical(found.spreads),
     )
     return Selected(chosen, best, evidence, factors, rmsd)
 

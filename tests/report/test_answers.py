@@ -390,9 +390,9 @@ def test_recommended_orders_and_maps_are_said(contents):
     assert "Recommended maps: none." in said
     # The model shown has others: the page says why.
     others = answered(contents, place=(advice.nb, advice.nk + 1), **worse).details[1]
-    assert f"this model has {advice.nb}/{advice.nk + 1}, chosen by other" in others
+    assert f"this model has {advice.nb}/{advice.nk + 1}, which other" in others
     own = answered(contents, place=(advice.nb, advice.nk), **worse).details[1]
-    assert "chosen by other" not in own
+    assert "which other" not in own
     chosen = answered(contents, maps=maps, own_maps=(("dead_zone", 0),), **worse)
     assert "those of this model came closest" in chosen.details[1]
     # A page that recommends other maps than it shows says how to get them.

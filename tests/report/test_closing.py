@@ -95,7 +95,7 @@ def test_a_recording_that_spoils_a_joined_model_is_one_to_look_at():
 def test_a_model_with_other_orders_than_the_recommended_ones_says_why():
     assert why_other_orders("it", (2, 3), (2, 3)) == ""
     assert why_other_orders("it", (2, 3), (1, 3)).startswith(
-        "it has 2/3, chosen by other recordings"
+        "it has 2/3, which other recordings"
     )
     assert BEST.place == (2, 3)
 

@@ -75,3 +75,13 @@ def test_the_recommendation_can_be_pasted_and_says_why():
 )
 def test_each_case_has_its_reason(changes, words):
     assert words in said(**changes)
+
+
+def test_where_no_model_predicts_the_others_no_maps_are_to_be_taken():
+    lost = replace(ADVICE.evidence, best_rmsd=0.3, output_spread=0.2)
+    text = said(evidence=lost)
+    assert text.startswith("These maps are no choice: no model of one recording")
+    assert "off by 0.3 rad/s" in text
+    assert "Put " not in text
+    table = as_text([map_table(replace(ADVICE, evidence=lost))], initial_state="zero")
+    assert "take" not in table.split()

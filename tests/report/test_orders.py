@@ -164,3 +164,14 @@ def test_a_delay_that_the_grid_does_not_reach_is_said_with_its_key(delays):
     key = f"put delays: [{', '.join(map(str, delays))}] into fit"
     assert (key in orders_sentence(advice, None)) == bool(delays)
     assert (key.capitalize() in said(**changes)) == bool(delays)
+
+
+def test_where_no_model_predicts_the_others_no_orders_are_recommended():
+    lost = replace(JUDGEMENT, best_rmsd=4.6, output_spread=0.2)
+    advice = replace(ADVICE, overall=replace(OVERALL, evidence=lost))
+    text = " ".join(as_text(order_reasons(advice)).split())
+    assert text.startswith("These orders are no choice: no model of one recording")
+    assert "off by 4.6 m, where outputs vary by 0.2 m" in text
+    assert orders_sentence(advice, None).startswith("none recommended: no model of one")
+    near = replace(JUDGEMENT, best_rmsd=0.19, output_spread=0.2)
+    assert "no choice" not in said(overall=replace(OVERALL, evidence=near))

@@ -93,3 +93,13 @@ def test_all_candidates_have_a_factor_and_a_typical_rmsd():
 
 
 ALIKE_2 = recording("large", 0.5, 1.0)
+
+
+def test_what_outputs_vary_by_says_whether_a_choice_is_one():
+    found = scored(tensor([[0.1, 0.5]]), ("small",), ("small", "alike"), (SMALL, ALIKE))
+    evidence = smallest_good(found, np.array([1, 2]), 0.05).evidence
+    assert evidence.output_spread == pytest.approx(ALIKE.output.std())
+    assert evidence.best_rmsd == 0.5
+    assert not evidence.predicts
+    near = scored(tensor([[0.1, 0.1]]), ("small",), ("small", "alike"), (SMALL, ALIKE))
+    assert smallest_good(near, np.array([1, 2]), 0.05).evidence.predicts
