@@ -28,6 +28,8 @@ _GAP = 0.05
 # Share of the range over which a local slope is taken: an outermost segment alone may be
 # a hundredth of it. Deeper, up to half, where fewer samples than these lie in it.
 _OUTER, _DEEPEST, _ENOUGH = 1.0 / 8.0, 0.5, 20
+# Share of the usual slope up to which the last stretch is a limit that was met.
+_FLAT = 0.1
 # Pieces of the range, and as many of them filled alike as let a slope go on to the end.
 _PIECES, _FILLED = 8, 6
 # Share of the range below which a distance is none.
@@ -190,6 +192,10 @@ def _line_ahead(
     # Levels have no slope: what lies an eighth away is the same or a jump.
     told = evenness * _filled(inward) if RULES[one.kind].has_slope else 0.0
     reach = rule.trust * told * width
+    flat = _GAP * width
+    n_there = np.count_nonzero(inward <= flat)
+    if n_there >= _ENOUGH and _is_flat(one, end - side * flat, end, line[0]):
+        depth = flat
     here, (value, before) = end, evaluate(one, np.array([end, end - side * depth]))
     if reach > _LEVEL * width:
         here, value = end + side * reach, value + (value - before) / depth * reach
@@ -202,6 +208,12 @@ def _line_ahead(
         values.append(slope * at + offset)
     order = slice(None, None, int(side))
     return [np.array(points)[order], np.array(values)[order]]
+
+
+def _is_flat(one: StaticMap, first: float, last: float, usual: float) -> bool:
+    """Whether a map hardly rises over a part, beside its usual slope: a limit it has met."""
+    before, after = evaluate(one, np.array([first, last]))
+    return bool(abs(after - before) <= _FLAT * abs(usual * (last - first)))
 
 
 def _outer_part(inward: np.ndarray) -> tuple[float, float]:

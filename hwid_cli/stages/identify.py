@@ -29,7 +29,7 @@ from hwid_cli.tasks.cache import Store, model_key, recording_key, task_key
 from hwid_cli.tasks.runner import RunSettings, Task, TaskDone, run_tasks
 
 NAME = "identify"
-STAGE_VERSION = 16
+STAGE_VERSION = 17
 
 # Runs tasks and returns them with their results, in their order.
 Run = Callable[[Sequence[Task]], Sequence[TaskDone]]

@@ -363,3 +363,25 @@ def test_a_model_is_normalised_before_it_is_extrapolated():
 
     with pytest.raises(ValueError, match="before its maps are extrapolated"):
         normalise(model)
+
+
+@pytest.mark.parametrize(
+    ("plateau", "n_there", "beyond"),
+    [
+        # Seven hundredths of the range, flat: a limit that samples have met.
+        (0.07, 100, 0.93),
+        # As flat, but hardly a sample there; and less than samples tell.
+        (0.07, 12, None),
+        (0.02, 100, None),
+    ],
+)
+def test_a_limit_that_samples_have_met_holds_beyond_them(plateau, n_there, beyond):
+    last = 1.0 - plateau
+    points = np.array([0.0, last, 1.0])
+    one = StaticMap("piecewise_linear", np.r_[points, 0.0, last, last], (0.0, 1.0))
+    rise, limit = np.linspace(0.0, last, 400), np.linspace(last, 1.0, n_there)
+    found = value(extrapolated_map(one, np.r_[rise, limit]), 1.3)[0]
+    if beyond is None:
+        assert found > last + 0.03
+    else:
+        assert found == pytest.approx(beyond)
