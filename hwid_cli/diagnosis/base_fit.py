@@ -87,6 +87,7 @@ def fitted_base(problem: DiagnosisProblem) -> FittedBase:
     scales = scales_of_recordings(problem, [one.velocity for one in given])
     base = _refit_base(problem, scales, noise)
     problem, base = _with_resistance(problem, base, scales, noise)
+    problem, base = _with_mass(problem, base, scales, noise)
     if _is_too_much(base, noise, problem.n_evaluated) or _shakes_at_rest(
         problem, base, scales, noise
     ):
@@ -193,6 +194,26 @@ def _with_resistance(
     free = _resistance_freed(problem)
     found = _refit_base(free, scales, noise)
     return (free, found) if found.sse.sum() < base.sse.sum() else (problem, base)
+
+
+def _with_mass(
+    problem: DiagnosisProblem, base: CandidateFit, scales: Scales, noise: NoiseFloor
+) -> tuple[DiagnosisProblem, CandidateFit]:
+    """The mass fitted beside a force constant that is known, if they contradict each other.
+
+    Recordings tell their ratio alone. Who knows one of them may have the other wrong: a
+    load that was not weighed looks like a part that swings along.
+    """
+    drive = problem.drive
+    is_held = "force_constant_N_per_A" in problem.known and not drive.has_known_forces
+    if base.whiteness <= 1.0 or not is_held or drive.is_resistance_free:
+        return problem, base
+    free = replace(problem, drive=replace(drive, is_mass_free=True))
+    found = _refit_base(free, scales, noise)
+    floor = problem.n_evaluated * noise.rms**2
+    excess, before = (float(one.sse.sum()) - floor for one in (found, base))
+    is_much = found.is_usable and excess <= _MUCH_LESS * before
+    return (free, found) if is_much else (problem, base)
 
 
 def with_free_resistance(fitted: FittedBase) -> FittedBase:

@@ -264,7 +264,7 @@ def _as_effect(
         changes = (-of_base[2], -of_base[1], of_base[3])
         for name, change in zip(BASE_PARAMETERS, changes, strict=True):
             base[name] = _near(base[name], change)
-        if drive.is_driven_by_force:
+        if drive.has_known_forces:
             # The regression holds the mass; here the force sets the scale.
             share = drive.force_constant_N_per_A / base["force_constant_N_per_A"]
             scaled = {name: share * base[name] for name in BASE_UNDER_FORCE}

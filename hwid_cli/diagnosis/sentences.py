@@ -380,16 +380,17 @@ def doubtful_values(base: Sequence[BaseParameter], drive: Drive) -> tuple[str, .
     doubtful = {
         one: ratio for one, ratio in moved.items() if max(ratio, 1 / ratio) > _DOUBTFUL
     }
+    contradicted = _contradicted_mass(base, drive)
     if not doubtful:
-        return ()
+        return contradicted
     if _is_the_mass(moved, drive):
         return (_questioned_mass(moved, drive),)
     rests = ""
-    if not drive.is_driven_by_force:
+    if not drive.has_known_forces:
         held, known = _held_and_known(drive)
         names = " and ".join(name_on(drive.axis, one) for one in held)
         rests = f"; it rests on the given {names}: {known}"
-    return tuple(
+    return contradicted + tuple(
         f"{one.name} was {one.before:.3g} and is fitted as {one.after:.3g}: "
         "check its value, or the units of the recordings; simulation.known: "
         f"[{one.name}] holds it{rests}"
@@ -426,10 +427,22 @@ def _is_the_mass(moved: Mapping[BaseParameter, float], drive: Drive) -> bool:
 
     Two values alone may go together by chance, and with a spring there are three.
     """
-    is_held = drive.resistance_ohm is None and not drive.is_driven_by_force
+    is_held = drive.resistance_ohm is None and not drive.has_known_forces
     if not is_held or len(moved) < _PROPORTIONAL:
         return False
     return max(moved.values()) <= _SAME_FACTOR * min(moved.values())
+
+
+def _contradicted_mass(base: Sequence[BaseParameter], drive: Drive) -> tuple[str, ...]:
+    """Say which mass goes with a force constant that the configuration holds."""
+    name = name_on(drive.axis, "mass_kg")
+    _, constant = _WORDS[drive.axis]
+    return tuple(
+        f"{name} {one.before:.4g} does not go with the {constant} that simulation.known "
+        f"holds: {one.after:.4g} is fitted instead, and forces count beside the {constant}"
+        for one in base
+        if one.name == name and drive.is_mass_free
+    )
 
 
 def _questioned_mass(moved: Mapping[BaseParameter, float], drive: Drive) -> str:
@@ -478,7 +491,7 @@ def hidden_from_view(problem: DiagnosisProblem) -> tuple[str, ...]:
             f"what happens before the {drive.source} ({_BEFORE[drive.source]}), because "
             "the input comes after it"
         )
-    if is_known and not drive.is_driven_by_force:
+    if is_known and not drive.has_known_forces:
         held, known = _held_and_known(drive)
         mass, _ = _WORDS[drive.axis]
         which = (

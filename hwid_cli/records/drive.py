@@ -39,7 +39,7 @@ BASE_UNDER_FORCE = ("mass_kg", "damping_N_s_per_m", "stiffness_N_per_m")
 BASE_AND_MASS = ("mass_kg", *BASE_PARAMETERS)
 # Fields of a drive that its file form has not: two are told by the names of others, one is
 # a matter of a re-fit.
-NOT_IN_FILES = ("axis", "input_unit", "is_resistance_free")
+NOT_IN_FILES = ("axis", "input_unit", "is_resistance_free", "is_mass_free")
 # Of a motor under a voltage whose resistance is off, so that a damping below 0 would fit.
 BASE_WITH_RESISTANCE = (
     "resistance_ohm",
@@ -227,6 +227,8 @@ class Drive:
     is_resistance_free : bool
         Whether a re-fit moves the resistance in the place of the damping: of both,
         recordings tell one.
+    is_mass_free : bool
+        Whether a re-fit moves the mass, and the force constant sets the scale.
     """
 
     mass_kg: Annotated[float, POSITIVE] = 1.0
@@ -245,6 +247,7 @@ class Drive:
     axis: Annotated[str, OneOf(AXES)] = "linear"
     input_unit: Annotated[str, OneOf(("", *SOURCES))] = ""
     is_resistance_free: bool = False
+    is_mass_free: bool = False
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -276,11 +279,16 @@ class Drive:
         return self.source_unit in FORCES
 
     @property
+    def has_known_forces(self) -> bool:
+        """Whether forces are to scale beside the input, and the mass is fitted."""
+        return self.is_driven_by_force or self.is_mass_free
+
+    @property
     def fitted_base(self) -> tuple[str, ...]:
         """Parameters of the base that a re-fit may move; the other one sets the scale."""
         if self.is_resistance_free:
             return BASE_WITH_RESISTANCE
-        return BASE_UNDER_FORCE if self.is_driven_by_force else BASE_PARAMETERS
+        return BASE_UNDER_FORCE if self.has_known_forces else BASE_PARAMETERS
 
 
 @dataclass(frozen=True)

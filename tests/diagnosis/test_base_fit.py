@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hwid_cli import diagnose
 from hwid_cli.diagnosis import base_fit, candidate
 from hwid_cli.diagnosis.candidate import with_input_noise
 from hwid_cli.diagnosis.diagnose import find
@@ -20,6 +21,7 @@ from tests.diagnosis.small_drive import (
     fit,
     problem,
     recordings,
+    simulation,
     sizes,
     white,
 )
@@ -251,3 +253,43 @@ def test_a_base_beside_what_is_missing_stays():
 
     assert with_it.sse.sum() < 0.1 * fitted.base.sse.sum()
     assert base_fit.fitted_from(fitted, with_it) is None
+
+
+@pytest.mark.parametrize(
+    ("known", "mass_kg", "is_free"),
+    [
+        ({"force_constant_N_per_A": 0.02}, 0.27, True),
+        ({"force_constant_N_per_A": 0.02}, 0.3, False),
+        ({"stiffness_N_per_m": 0.02}, 0.27, False),
+        ({}, 0.27, False),
+    ],
+)
+def test_a_known_force_constant_that_contradicts_the_mass_sets_the_scale(
+    known, mass_kg, is_free
+):
+    of = problem(recordings(), mass_kg=mass_kg, known=known)
+    found = base_fit.fitted_base(of)
+    drive = candidate.fitted_drive(found.problem.drive, found.base)
+    assert found.problem.drive.is_mass_free is is_free
+    assert drive.mass_kg == pytest.approx(0.3 if is_free else mass_kg, rel=2e-3)
+    if is_free:
+        assert found.base.whiteness <= 1.0
+        assert drive.force_constant_N_per_A == 5.0
+        assert drive.stiffness_N_per_m == pytest.approx(1184.0, rel=2e-3)
+
+
+def test_a_missing_spring_is_no_reason_to_doubt_the_mass():
+    stiff = {"cubic_stiffness": {"stiffness_N_per_m3": 8e5}}
+    of = problem(recordings(stiff), known={"force_constant_N_per_A": 0.02})
+    assert not base_fit.fitted_base(of).problem.drive.is_mass_free
+
+
+def test_a_mass_that_does_not_go_with_a_known_force_constant_is_said():
+    options = DiagnoseOptions(effects=("coulomb_friction",), laws="never")
+    simulated = simulation(mass_kg=0.27, known={"force_constant_N_per_A": 0.02})
+    found = diagnose(recordings(), simulated, options)
+    assert found.verdict == "parameters"
+    (said,) = [one for one in found.warnings if "does not go with" in one]
+    assert said.startswith("mass_kg 0.27 does not go with the force constant that")
+    after = {one.name: one.after for one in found.base}
+    assert after["mass_kg"] == pytest.approx(0.3, rel=2e-3)
