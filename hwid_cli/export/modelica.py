@@ -263,9 +263,8 @@ def _law_of(name: str) -> _Law:
     plain = name.removesuffix(":second")
     if plain not in LAWS:
         raise ConfigError(
-            f"--format modelica: simulation.effects.{name}: is no plain equation of "
-            f"position, velocity and input; expected one of {', '.join(LAWS)}, or a "
-            "formula; use --format c"
+            f"--format modelica: simulation.effects.{name}: has no text in Modelica; "
+            f"expected one of {', '.join(LAWS)}, or a formula; use --format c"
         )
     return LAWS[plain]
 

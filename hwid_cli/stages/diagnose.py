@@ -55,12 +55,10 @@ from hwid_cli.stages.simulation_units import (
     refused_sizes,
     refused_units,
 )
-from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage, as_record
 from hwid_cli.stages.swapped_signals import swapped_sentence
 from hwid_cli.store.diagnosis_results import (
     read_diagnosis,
-    read_diagnosis_record,
-    write_diagnosis,
     write_diagnosis_json,
     write_diagnosis_tables,
 )
@@ -634,11 +632,7 @@ STAGE = Stage(
     choose=choose,
     key=lambda given: given.key,
     compute=_compute,
-    storage=in_results(
-        "diagnose",
-        read_diagnosis_record,
-        lambda path, given, result, origin: write_diagnosis(path, result, origin),
-    ),
+    storage=as_record(NAME, Diagnosis),
     summary=lambda given, result, is_stored: (
         f"{counted(len(given.recordings), 'recording')} from the cache"
         if is_stored

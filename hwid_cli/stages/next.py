@@ -48,12 +48,10 @@ from hwid_cli.stages.output_range import (
     within,
 )
 from hwid_cli.stages.ranking import best_fits
-from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
+from hwid_cli.stages.stage import Context, Planning, Runner, Stage, as_record
 from hwid_cli.stages.trust import kept_for_test
 from hwid_cli.store.next_results import (
-    read_next,
     read_previous,
-    write_next,
     write_next_files,
 )
 from hwid_cli.store.result_files import Provenance
@@ -287,11 +285,7 @@ STAGE = Stage(
     choose=_choose,
     key=lambda given: given.key,
     compute=propose_next,
-    storage=in_results(
-        NAME,
-        read_next,
-        lambda path, given, result, origin: write_next(path, result, origin),
-    ),
+    storage=as_record(NAME, NextRecordings),
     summary=lambda given, result, is_stored: (
         f"{result.n_offered} inputs compared"
         + (" (unchanged since the last run)" if is_stored else "")

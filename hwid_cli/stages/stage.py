@@ -18,6 +18,7 @@ from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.report.table import Block
 from hwid_cli.store.result_files import Provenance, read_stage_key, results_file
+from hwid_cli.store.stage_records import read_stage_record, write_stage_record
 from hwid_cli.tasks.cache import MemoryStore, Store
 from hwid_cli.tasks.runner import RunSettings
 
@@ -88,6 +89,17 @@ def in_results(
 ) -> Storage:
     """Storage as the results of most stages have it: in HDF5, beside their key."""
     return Storage(results_file(stage), partial(_stored_key, stage), read, write)
+
+
+def as_record(stage: str, record_type: type) -> Storage:
+    """Storage of a stage whose results are one record."""
+    return in_results(
+        stage,
+        lambda path: read_stage_record(path, stage, record_type),
+        lambda path, given, result, origin: write_stage_record(
+            path, stage, result, origin
+        ),
+    )
 
 
 def _stored_key(stage: str, out: Path) -> str | None:

@@ -25,8 +25,7 @@ from hwid_cli.records.diagnosis import (
     Law,
 )
 from hwid_cli.records.recordings import SignalUnit
-from hwid_cli.store.hdf5_records import read_record, write_record
-from hwid_cli.store.result_files import Provenance, read_results, replaced_stage
+from hwid_cli.store.result_files import Provenance
 
 # What the report relies on; a value that is absent or null is not shown.
 _FORMS: dict[str, type] = {
@@ -327,29 +326,6 @@ SIMULATED_COLUMNS = ("time_s", "input", "measured", "simulated")
 _STAGE = "diagnose"
 # In a table the simulation without any further effect.
 _BASE = "base"
-
-
-def write_diagnosis(path: Path, diagnosis: Diagnosis, provenance: Provenance) -> None:
-    """Write ``results.h5:/diagnose``.
-
-    Raises
-    ------
-    CacheError
-        If it cannot be written; an old file is untouched then.
-    """
-    with replaced_stage(path, _STAGE, provenance) as group:
-        write_record(group, diagnosis)
-
-
-def read_diagnosis_record(path: Path) -> Diagnosis:
-    """Read ``results.h5:/diagnose``.
-
-    Raises
-    ------
-    CacheError
-        If it is missing or cannot be read.
-    """
-    return read_results(path, _STAGE, lambda file: read_record(file[_STAGE], Diagnosis))
 
 
 def write_diagnosis_tables(folder: Path, diagnosis: Diagnosis) -> None:

@@ -9,44 +9,16 @@ from hwid_cli.errors import CacheError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.csv_tables import write_table_csv
 from hwid_cli.records.next import PROPOSED_COLUMNS, NextRecordings, ProposedRecording
-from hwid_cli.store.hdf5_records import read_record, write_record
 from hwid_cli.store.result_files import (
-    Provenance,
     has_left_results,
-    read_results,
-    replaced_stage,
     results_file,
 )
+from hwid_cli.store.stage_records import read_stage_record
 
 NEXT_COLUMNS = ("rank", "name", "input", "gain", "unit_of_gain", "reason", "file")
 _STAGE, _FOLDER = "next", "next"
 # Digits of a time stamp: more than any clock has, fewer than rounding errors show in.
 _TIME_DIGITS = 12
-
-
-def write_next(path: Path, found: NextRecordings, provenance: Provenance) -> None:
-    """Write ``results.h5:/next``.
-
-    Raises
-    ------
-    CacheError
-        If it cannot be written; an old file is untouched then.
-    """
-    with replaced_stage(path, _STAGE, provenance) as group:
-        write_record(group, found)
-
-
-def read_next(path: Path) -> NextRecordings:
-    """Read ``results.h5:/next``.
-
-    Raises
-    ------
-    CacheError
-        If it is missing or cannot be read.
-    """
-    return read_results(
-        path, _STAGE, lambda file: read_record(file[_STAGE], NextRecordings)
-    )
 
 
 def read_previous(out: Path) -> NextRecordings | None:
@@ -61,7 +33,7 @@ def read_previous(out: Path) -> NextRecordings | None:
     if not has_left_results(path, _STAGE):
         return None
     try:
-        return read_next(path)
+        return read_stage_record(path, _STAGE, NextRecordings)
     except CacheError:
         # Of another version: the new proposal takes its place, and only cannot say what
         # changed since.

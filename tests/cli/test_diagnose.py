@@ -7,7 +7,8 @@ from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
 from hwid_cli.config.load import load_experiment
-from hwid_cli.store.diagnosis_results import read_diagnosis_record
+from hwid_cli.records.diagnosis import Diagnosis
+from hwid_cli.store.stage_records import read_stage_record
 from tests.cli.drive_examples import CONFIG, FRICTION, write_measurements
 from tests.conftest import leave_figures_blank
 
@@ -102,7 +103,7 @@ def test_the_missing_friction_is_found_and_everything_is_written(first_run):
 
 def test_the_record_is_stored_with_its_provenance(first_run):
     out = first_run[0] / "out"
-    record = read_diagnosis_record(out / "results.h5")
+    record = read_stage_record(out / "results.h5", "diagnose", Diagnosis)
 
     assert record.verdict == found_in(out)["verdict"]
     assert len(record.gaps) == 8

@@ -91,9 +91,11 @@ def test_the_document_shows_what_is_said(fault, tmp_path):
 
 def test_every_ending_and_every_library_is_named():
     keys = (PROJECT / "configs" / "README.md").read_text()
+    # Below the first table an ending may be one that is refused.
+    table = DOCUMENT.split("## What is read")[1].split("\n\n")[1]
     for reader in READERS:
         for suffix in reader.suffixes:
-            assert f"`{suffix}`" in DOCUMENT
+            assert f"`{suffix}`" in table
             assert f"`{suffix}`" in keys
         assert reader.needs in DOCUMENT
 

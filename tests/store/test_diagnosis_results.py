@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from hwid_cli.errors import CacheError
+from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.store.diagnosis_results import (
-    read_diagnosis_record,
-    write_diagnosis,
     write_diagnosis_tables,
     write_simulated_csv,
 )
 from hwid_cli.store.result_files import Provenance, read_provenance, read_stage_key
+from hwid_cli.store.stage_records import read_stage_record, write_stage_record
 from tests.report.diagnosis_examples import named, nothing_missing, unknown
 from tests.store.record_examples import assert_same, plant
 
@@ -25,30 +25,30 @@ def rows_of(path):
 @pytest.mark.parametrize("make", [named, unknown, nothing_missing])
 def test_a_diagnosis_comes_back_bit_by_bit(tmp_path, make):
     path = tmp_path / "results.h5"
-    write_diagnosis(path, make(), Provenance("k1", seconds=2.5))
+    write_stage_record(path, "diagnose", make(), Provenance("k1", seconds=2.5))
 
-    assert_same(read_diagnosis_record(path), make())
+    assert_same(read_stage_record(path, "diagnose", Diagnosis), make())
     assert read_stage_key(path, "diagnose") == "k1"
     assert read_provenance(path, "diagnose").seconds == 2.5
 
 
 def test_a_later_diagnosis_takes_the_place_of_the_first(tmp_path):
     path = tmp_path / "results.h5"
-    write_diagnosis(path, named(), Provenance("k1"))
-    write_diagnosis(path, nothing_missing(), Provenance("k2"))
+    write_stage_record(path, "diagnose", named(), Provenance("k1"))
+    write_stage_record(path, "diagnose", nothing_missing(), Provenance("k2"))
 
-    assert_same(read_diagnosis_record(path), nothing_missing())
+    assert_same(read_stage_record(path, "diagnose", Diagnosis), nothing_missing())
     assert read_stage_key(path, "diagnose") == "k2"
 
 
 def test_a_damaged_diagnosis_is_one_line_with_the_next_step(tmp_path):
     path = tmp_path / "results.h5"
-    write_diagnosis(path, named(), Provenance("k1"))
+    write_stage_record(path, "diagnose", named(), Provenance("k1"))
     with h5py.File(path, "r+") as file:
         del file["diagnose/gaps"]
 
     with pytest.raises(CacheError, match=r"results of diagnose; .*'hwid diagnose'"):
-        read_diagnosis_record(path)
+        read_stage_record(path, "diagnose", Diagnosis)
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_a_damaged_diagnosis_is_one_line_with_the_next_step(tmp_path):
 )
 def test_a_planted_number_is_one_line_with_its_place(tmp_path, place, value):
     path = tmp_path / "results.h5"
-    write_diagnosis(path, named(), Provenance("k1"))
+    write_stage_record(path, "diagnose", named(), Provenance("k1"))
     plant(path, f"diagnose/{place}", [value, 1.0])
 
     group, name = place.rsplit("/", 1)
@@ -67,7 +67,7 @@ def test_a_planted_number_is_one_line_with_its_place(tmp_path, place, value):
         match=rf"/diagnose/{group}: {name} must be finite numbers up to 1e\+130, got "
         rf".* run 'hwid diagnose' again",
     ):
-        read_diagnosis_record(path)
+        read_stage_record(path, "diagnose", Diagnosis)
 
 
 @pytest.mark.parametrize(
@@ -79,11 +79,11 @@ def test_a_planted_number_is_one_line_with_its_place(tmp_path, place, value):
 )
 def test_curves_of_different_lengths_are_one_line(tmp_path, place, says):
     path = tmp_path / "results.h5"
-    write_diagnosis(path, named(), Provenance("k1"))
+    write_stage_record(path, "diagnose", named(), Provenance("k1"))
     plant(path, f"diagnose/{place}", [1.0])
 
     with pytest.raises(CacheError, match=f"{says}.* must have one shape"):
-        read_diagnosis_record(path)
+        read_stage_record(path, "diagnose", Diagnosis)
 
 
 def test_the_ranking_lists_every_candidate_best_first(tmp_path):
