@@ -33,8 +33,6 @@ _SWINGS, _OF_ONE_FREQUENCY = ("periodic_force", "sensor_hum"), 0.005
 _STOPS = ("end_stop", "one_sided_stop")
 _BEND = ("cubic_stiffness", "quadratic_stiffness", "spring_gap", *_STOPS)
 _SOFT, _GO_TOGETHER = 2.0, 0.5
-# Share of the farthest displacement within which it is in the middle, [-].
-_MIDDLE = 0.05
 # Share of the best determined direction below which one counts as undetermined.
 _DETERMINED = 1e-12
 # A strength that is so near its bound would go farther, [-].
@@ -82,11 +80,7 @@ def unclear_effects(
         own = CATALOGUE[effect].told_by
         return tuple(one for one in refs if not is_shared or one.parameter == own)
 
-    imitating = (
-        *harmonics(found),
-        *soft_stops(problem, found),
-        *stops_from_the_middle(problem, found),
-    )
+    imitating = (*harmonics(found), *soft_stops(problem, found))
     return tuple(
         effect
         for effect in found.effects
@@ -130,21 +124,6 @@ def soft_stops(problem: DiagnosisProblem, found: CandidateFit) -> tuple[str, ...
         if public_id(one) in _STOPS
         and values.get(ParameterRef(one, "exponent"), 1.0) <= 1.0
         and values[ParameterRef(one, "stiffness_N_per_m")] < _SOFT * spring
-    )
-
-
-def stops_from_the_middle(
-    problem: DiagnosisProblem, found: CandidateFit
-) -> tuple[str, ...]:
-    """Curved contacts on both sides that begin where the motion hardly has: a spring's law."""
-    farthest = max(float(np.max(np.abs(one.position))) for one in problem.signals)
-    values = dict(zip(found.names, found.values, strict=True))
-    return tuple(
-        one
-        for one in found.effects
-        if public_id(one) == "end_stop"
-        and values.get(ParameterRef(one, "exponent"), 1.0) > 1.0
-        and values[ParameterRef(one, "position_m")] <= _MIDDLE * farthest
     )
 
 

@@ -5,6 +5,7 @@ docs/method_diagnosis.md, eq. (D15).
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy
@@ -127,7 +128,7 @@ def scales_of_fit(
     compared = compared_with_fit(problem, found, given)
     drive = fitted_drive(problem.drive, found)
     force = latent_force(compared, drive, noise)
-    return scales_of_recordings(
+    scales = scales_of_recordings(
         problem,
         [one.velocity for one in compared],
         line_frequencies(compared, noise),
@@ -135,6 +136,7 @@ def scales_of_fit(
         waves_along(compared, force, motor_force(compared, drive)),
         missing_along(compared, force, drive),
     )
+    return replace(scales, reading_waves=waves_of_reading(compared, force))
 
 
 def missing_along(
@@ -276,7 +278,37 @@ def waves_along(
         The strongest first, at most three; none where nothing moves.
     """
     force = evaluated_force(compared, smoothed)
-    position = evaluated_position(compared, smoothed)
+    return _waves(force, evaluated_position(compared, smoothed), factor)
+
+
+def waves_of_reading(
+    compared: Sequence[Compared], smoothed: Sequence[Smoothed]
+) -> tuple[Wave, ...]:
+    """Waves with which the reading of the sensor errs along the way.
+
+    Returns
+    -------
+    tuple of Wave
+        As ``waves_along``, of what a simulation leaves of the measured position itself: as
+        a force the same error weighs by the square of the speed. None of a velocity.
+    """
+    if any(one.signals.is_velocity for one in compared):
+        return ()
+    left = joined(
+        compared,
+        [_about_mean(one.signals.compared - one.simulated) for one in compared],
+    )
+    return _waves(left, evaluated_position(compared, smoothed), None)
+
+
+def _about_mean(residual: np.ndarray) -> np.ndarray:
+    known = finite(residual)
+    return known - known.mean()
+
+
+def _waves(
+    force: np.ndarray, position: np.ndarray, factor: np.ndarray | None
+) -> tuple[Wave, ...]:
     stroke = float(np.ptp(position)) if position.size else 0.0
     if stroke <= 0 or (factor is not None and not factor.any()):
         return ()

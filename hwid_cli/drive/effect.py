@@ -30,7 +30,7 @@ class Wave:
     Parameters
     ----------
     period_m : float, [m]
-    amplitude : float, [N]; [-] where it multiplies a force
+    amplitude : float, [N]; [-] where it multiplies a force, [m] of a reading
     phase_rad : float, [rad]
     """
 
@@ -119,6 +119,8 @@ class Scales:
         With which it repeats most along the way.
     ripples : tuple of Wave
         With which its share of the motor's force does.
+    reading_waves : tuple of Wave
+        With which what the base leaves of the reading itself does.
     resistance_ohm : float, [ohm]
         Of the circuit; 1 where there is none and the input is the current.
     reading : float, [m] or [m/s]
@@ -148,6 +150,7 @@ class Scales:
     frequencies_Hz: tuple[float, ...] = ()
     waves: tuple[Wave, ...] = ()
     ripples: tuple[Wave, ...] = ()
+    reading_waves: tuple[Wave, ...] = ()
     resistance_ohm: float = 1.0
     reading: float = 0.0
     missing: Missing | None = field(default=None, compare=False, repr=False)
@@ -465,6 +468,10 @@ class Effect:
         """List what the recordings show, or all combinations of start values."""
         if self.seen is not None and self.seen(scales):
             return list(self.seen(scales))
+        return self.grid(scales)
+
+    def grid(self, scales: Scales) -> list[dict[str, float]]:
+        """All combinations of start values."""
         names = [one.name for one in self.parameters]
         grids = [one.starts(scales) for one in self.parameters]
         return [dict(zip(names, values, strict=True)) for values in product(*grids)]

@@ -13,6 +13,7 @@ from hwid_cli.diagnosis.scales import (
     motor_force,
     scales_of_recordings,
     waves_along,
+    waves_of_reading,
 )
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Wave
@@ -106,6 +107,41 @@ def test_a_share_of_the_motor_force_that_repeats_is_read_off():
     )
     assert starts[0]["per_turn"] == pytest.approx(2 * np.pi / 0.0019, rel=2e-3)
     assert starts[0]["share"] == pytest.approx(0.2, rel=0.1)
+
+
+@pytest.mark.parametrize(("period", "phase"), [(0.0019, 0.4), (0.0006, -2.0)])
+def test_what_a_sensor_errs_by_along_the_way_is_read_off(period, phase):
+    rng = np.random.default_rng(8)
+    at_rest = compared([np.zeros(400)] * 9)
+    errors = [
+        3e-4 * np.sin(2 * np.pi * one.position / period + phase)
+        # A zero of its own and noise.
+        + 1e-3 * number
+        + 2e-5 * rng.standard_normal(400)
+        for number, one in enumerate(at_rest)
+    ]
+    pairs = compared(errors)
+    smoothed = [
+        Smoothed(np.zeros(400), one.position, one.velocity, np.zeros(400))
+        for one in at_rest
+    ]
+    best = waves_of_reading(pairs, smoothed)[0]
+    assert best.period_m == pytest.approx(period, rel=2e-3)
+    assert best.amplitude == pytest.approx(3e-4, rel=0.1)
+    assert abs(np.angle(np.exp(1j * (best.phase_rad - phase)))) < 0.2
+
+    effect = CATALOGUE["sensor_eccentricity"]
+    scales = replace(sizes(problem()), reading_waves=(best,))
+    first, *others = effect.starts(scales)
+    assert first["period_m"] == best.period_m
+    assert others == effect.grid(scales)
+
+
+def test_a_velocity_has_no_place_to_err_at():
+    (pair,) = compared([np.zeros(400)])[:1]
+    of_speed = replace(pair, signals=replace(pair.signals, is_velocity=True))
+    still = Smoothed(np.ones(400), np.zeros(400), np.zeros(400), np.zeros(400))
+    assert waves_of_reading([of_speed], [still]) == ()
 
 
 def test_without_motion_nothing_repeats():

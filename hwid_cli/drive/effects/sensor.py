@@ -162,6 +162,22 @@ def _periods(scales: Scales) -> tuple[float, ...]:
     )
 
 
+def _seen_eccentricity(scales: Scales) -> tuple[dict[str, float], ...]:
+    """Waves of the reading itself, and those that the missing force shows."""
+    periods = next(one for one in ECCENTRICITY.parameters if one.name == "period_m")
+    shortest, longest = periods.bounds(scales)
+    found = tuple(
+        {
+            "amplitude_m": one.amplitude,
+            "period_m": one.period_m,
+            "phase_rad": one.phase_rad,
+        }
+        for one in scales.reading_waves
+        if shortest <= one.period_m <= longest and one.amplitude > 0
+    )
+    return (*found, *ECCENTRICITY.grid(scales)) if found else ()
+
+
 ECCENTRICITY = Effect(
     id="sensor_eccentricity",
     sentence="the reading errs periodically along the way, as of a scale off its center",
@@ -193,6 +209,7 @@ ECCENTRICITY = Effect(
         "cogging": "the same way slowly and fast: the error of a sensor stays",
         "sensor_cubic": "motion over the whole stroke",
     },
+    seen=_seen_eccentricity,
 )
 
 # Clocks of two devices agree far better; beyond it the recording is another one.
