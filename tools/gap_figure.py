@@ -10,7 +10,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from hwid_cli.records.diagnosis import Diagnosis
-from hwid_cli.store.diagnosis_results import read_diagnosis_record
+from hwid_cli.store.stage_records import read_stage_record
 
 _DPI = 110
 _MILLI = 1e3
@@ -43,7 +43,7 @@ def gap_figure(found: Diagnosis, name: str = "") -> Figure:
 def main() -> None:
     """Read the results and write the figure."""
     results, target, *names = sys.argv[1:]
-    found = read_diagnosis_record(Path(results) / "results.h5")
+    found = read_stage_record(Path(results) / "results.h5", "diagnose", Diagnosis)
     gap_figure(found, *names).savefig(target, dpi=_DPI, metadata={"Software": None})
 
 
