@@ -412,9 +412,13 @@ class SelectionCriteria:
             return LEAST_EXPLAINED_FAR if self.is_far(found) else LEAST_EXPLAINED_SET
         if self.ratio(found) <= STILL_LARGE:
             return LEAST_EXPLAINED
+        # Beside a reading that errs, whatever is left moves the machine, and may be all.
+        (effect,) = found.effects or ("",)
+        errs = bool(effect) and CATALOGUE[effect].enters == "output"
         is_free = has_own_values(found)
         is_far = self.rms(found, held_out=True) > LARGE_SHARE_OF_MOTION * self.motion
-        return LEAST_EXPLAINED_FAR if is_free or is_far else LEAST_EXPLAINED_LARGE
+        is_doubtful = is_free or is_far or errs
+        return LEAST_EXPLAINED_FAR if is_doubtful else LEAST_EXPLAINED_LARGE
 
     def is_far(self, found: CandidateFit) -> bool:
         """Whether a set of several effects leaves more than such sets may."""

@@ -837,6 +837,23 @@ def test_beside_a_small_gap_an_effect_has_to_explain_most_of_it(explained, word)
     assert decided(left, [one], [one], given=130.0).word == word
 
 
+@pytest.mark.parametrize(
+    ("effect", "left", "word"),
+    [
+        # 80 % of the gap, and four times the noise.
+        ("quadratic_drag", 1600.0, "named"),
+        ("sensor_drift", 1600.0, "unknown"),
+        # Little is left, or next to nothing of the gap.
+        ("sensor_drift", 700.0, "named"),
+        ("sensor_drift", 170.0, "named"),
+    ],
+)
+def test_a_reading_that_errs_explains_all_or_leaves_little(effect, left, word):
+    one = made_up((effect,), left, whiteness=9.0)
+    found = decided(base(7600.0, whiteness=30.0), [one], [one], given=7600.0)
+    assert found.word == word
+
+
 def test_there_is_a_word_for_every_case_and_no_other():
     words = {"named", "ambiguous", "law", "parameters", "unknown", "none"}
     assert set(VERDICTS) == words
