@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from hwid_cli.cli.session import Session, Timer, screen_width
 from hwid_cli.cli.stage_runner import LinearRunner
-from hwid_cli.records.best_model import BestModel
+from hwid_cli.records.best_model import LINEAR, BestModel
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.experiment import CrossvalOptions
 from hwid_cli.records.report import StoredResults
@@ -38,6 +38,7 @@ _WITHOUT_MODEL = ("diagnose", "calibrate", "next")
 _MOST_WARNINGS = 2
 # The model to take, as export knows it, in place of a name that is longer than a line.
 BEST, _LONG_NAME = "best", 60
+BEST_LINEAR = f"{LINEAR}{BEST}"
 # What follows a stage, unless its results say more.
 _NEXT = {
     "simulate": "run",

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from hwid_cli.cli.closing import BEST, recommended
+from hwid_cli.cli.closing import BEST, BEST_LINEAR, recommended
 from hwid_cli.cli.driver import result_of
 from hwid_cli.cli.linear_models import linear_model
 from hwid_cli.cli.options import Choices
@@ -121,8 +121,8 @@ def chosen_model(session: Session, asked: str, *, with_trust: bool = False) -> E
     ConfigError
         If there is no such model.
     """
-    if asked == BEST:
-        asked = _best_name(session)
+    if asked in (BEST, BEST_LINEAR):
+        asked = _best_name(session, is_linear=asked == BEST_LINEAR)
     if asked == SIMULATION:
         return _simulation(session)
     if asked.startswith(LINEAR):
@@ -140,8 +140,8 @@ def chosen_model(session: Session, asked: str, *, with_trust: bool = False) -> E
     return _exported(session, fit, (name, title), made_by, with_trust)
 
 
-def _best_name(session: Session) -> str:
-    """Name of the model to take by the stages that have run."""
+def _best_name(session: Session, *, is_linear: bool) -> str:
+    """Name of the model to take by the stages that have run, or of the linear one beside it."""
     for stage in ("identify", "crossval", "group", "test"):
         path = session.out / results_file(stage)
         if stage == "identify" or has_left_results(path, stage):
@@ -152,8 +152,14 @@ def _best_name(session: Session) -> str:
             f"--model {BEST}: no model can be taken; expected one that holds on other "
             "recordings; 'hwid run' says what may help, or give the name of a model"
         )
-    session.note(f"best model: {best.taken_name}")
-    return best.taken_name
+    name = best.linear_name if is_linear else best.taken_name
+    if not name:
+        raise ConfigError(
+            f"--model {BEST_LINEAR}: no linear model was compared; expected one; run "
+            f"'hwid crossval', or give its name as {LINEAR}RECORDING/NB/NK"
+        )
+    session.note(f"best {'linear ' * is_linear}model: {name}")
+    return name
 
 
 def _exported(

@@ -41,7 +41,7 @@ def _split(session: Session, text: str) -> tuple[str, Orders]:
     parts = text.removeprefix(LINEAR).rsplit("/", 2)
     if len(parts) != 3 or not all(part.isdecimal() for part in parts[1:]):
         raise ConfigError(
-            f"{text}: expected linear:RECORDING/NB/NK, such as linear:step_06/2/3"
+            f"{text}: expected linear:RECORDING/NB/NK, such as linear:step_06/2/3, or linear:best"
         )
     nb, nk = int(parts[1]), int(parts[2])
     grid = session.experiment.orders

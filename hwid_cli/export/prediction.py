@@ -19,6 +19,8 @@ from hwid_cli.records.trust import Band
 
 # A time column may jitter by this share of a step, and differ so much in its mean step.
 _TOLERANCE = 0.01
+# Columns that say which samples of a prediction rest on data, and in which respect.
+_KNOWN = ("value_known", "rate_known", "frequency_known")
 # Names that are listed where one has to be chosen.
 _LISTED = 3
 # So much of a file's first line tells whether it is a prediction, [characters].
@@ -275,7 +277,11 @@ def _is_prediction(path: Path) -> bool:
             names = next(csv.reader([file.readline(_LONGEST_HEADER)]), [])
     except (OSError, UnicodeDecodeError, csv.Error):
         return False
-    return len(names) in (3, 5) and (names[0], names[2]) == ("time", "predicted")
+    if names[:1] + names[2:3] != ["time", "predicted"]:
+        return False
+    band = ["lower", "upper"]
+    # With a band alone, as earlier versions wrote it, or with what rests on data.
+    return names[3:] in (list[str](), band, [*band, *_KNOWN])
 
 
 def write_prediction(
@@ -295,7 +301,8 @@ def write_prediction(
     time, values, predicted : ndarray, shape (n_samples,)
         Time [s], input as it was read, output [output unit].
     band : Band, optional
-        Adds the columns ``lower`` and ``upper``.
+        Adds the columns ``lower`` and ``upper``, and of each sample whether recordings of
+        the model were at its value, at its rate and that strong at its frequencies, 1 or 0.
 
     Raises
     ------
@@ -305,8 +312,10 @@ def write_prediction(
     header = ["time", prediction_column(exported), "predicted"]
     signals = [time, values, predicted]
     if band is not None:
-        header += ["lower", "upper"]
-        signals += [band.lower, band.upper]
+        where = band.inside
+        known = (where.amplitude, where.rate, where.frequency)
+        header += ["lower", "upper", *_KNOWN]
+        signals += [band.lower, band.upper, *(one.astype(int) for one in known)]
     columns = (column.tolist() for column in signals)
     write_table_csv(path, header, zip(*columns, strict=True))
 
@@ -320,5 +329,5 @@ def prediction_column(exported: Exported) -> str:
         ``input`` where the model's data have numbers for names.
     """
     name = exported.card.columns.input
-    is_taken = name in ("time", "predicted", "lower", "upper")
+    is_taken = name in ("time", "predicted", "lower", "upper", *_KNOWN)
     return name if isinstance(name, str) and not is_taken else "input"

@@ -25,7 +25,7 @@ COLUMNS = (
 
 
 def band_note(band: Band, unit: str, judged_on: Sequence[str]) -> str:
-    """Say how wide a band is, what tells that, and how much rests on data.
+    """Say how wide a band is, what tells that, and how much rests on data; a line each.
 
     Parameters
     ----------
@@ -39,16 +39,19 @@ def band_note(band: Band, unit: str, judged_on: Sequence[str]) -> str:
         told = f"its width is told by {which}, held out or left out in turn"
     width = number(float(np.mean(band.upper - band.lower)))
     beyond = 1.0 - float(where.amplitude.mean())
-    says_so = (
-        f"; at the {share_text(beyond)} of the samples whose values no recording of the "
-        "model had it is wider, but nobody has checked that it holds 90 % there"
-    )
-    return (
-        f"the band of 90 % is {width}{behind(unit)} wide on average; {told}; "
+    lines = [
+        f"the band of 90 % is {width}{behind(unit)} wide on average; {told}",
         f"{share_text(where.all.mean())} of the samples rest on data in every respect "
-        f"(value {share_text(where.amplitude.mean())}, rate {share_text(where.rate.mean())}, frequency "
-        f"{share_text(where.frequency.mean())}){says_so * (beyond >= _MUCH_BEYOND)}"
-    )
+        f"(value {share_text(where.amplitude.mean())}, rate "
+        f"{share_text(where.rate.mean())}, frequency "
+        f"{share_text(where.frequency.mean())}); the columns ..._known say which",
+    ]
+    if beyond >= _MUCH_BEYOND:
+        lines.append(
+            f"at the {share_text(beyond)} of the samples whose values no recording of the "
+            "model had the band is wider, but nobody has checked that it holds 90 % there"
+        )
+    return "\n".join(lines)
 
 
 TESTED = "How far models may be trusted on the test recordings"

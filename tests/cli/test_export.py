@@ -1,5 +1,6 @@
 import csv
 import json
+import re
 
 import pytest
 import yaml
@@ -49,6 +50,16 @@ def test_the_model_to_take_is_exported_without_its_name(after_run, hwid, out):
     stem = name.replace("/", "_").replace(":", "_")
     assert result.stdout == f"{out / 'models' / f'{stem}.json'}\n"
     assert f"best model: {name}" in result.stderr
+
+
+def test_the_linear_model_beside_it_has_a_name_too(after_run, hwid, out):
+    result = hwid("export", "--model", "linear:best")
+
+    assert result.exit_code == 0, result.output
+    (name,) = re.findall(r"best linear model: (linear:\S+)", result.stderr)
+    stem = name.replace("/", "_").replace(":", "_")
+    assert result.stdout == f"{out / 'models' / f'{stem}.json'}\n"
+    assert hwid("export", "--model", name).stdout == result.stdout
 
 
 def test_a_name_that_is_longer_than_a_line_is_not_asked_for(

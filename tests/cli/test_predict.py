@@ -266,8 +266,10 @@ def test_a_file_without_an_end_is_one_line(model, tmp_path, kind):
     assert str(given if "input" in kind else place) in done.stderr
 
 
-def test_a_band_adds_two_columns_around_the_same_prediction(tmp_path):
+def test_a_band_adds_its_limits_and_what_rests_on_data(tmp_path):
     u = example_input(1)
+    # Farther than the recordings of the model.
+    u[-20:] = 5.0 * np.abs(u).max()
     path, out = tmp_path / "m.json", tmp_path / "p.csv"
     write_json(path, with_trust(exported_of(example_model(1))))
     given = write_input(tmp_path / "u.csv", u)
@@ -279,7 +281,13 @@ def test_a_band_adds_two_columns_around_the_same_prediction(tmp_path):
     assert "of the samples rest on data in every respect" in result.stdout
     with out.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert list(rows[0])[2:] == ["predicted", "lower", "upper"]
+    known = ["value_known", "rate_known", "frequency_known"]
+    assert list(rows[0])[2:] == ["predicted", "lower", "upper", *known]
+    rests = np.array([[int(row[name]) for name in known] for row in rows])
+    assert set(rests.ravel()) == {0, 1}
+    assert not rests[-20:, 0].any()
+    share = f"(value {100 * rests[:, 0].mean():.0f} %"
+    assert share in " ".join(result.stdout.split())
     low, high = (np.array([float(row[k]) for row in rows]) for k in ("lower", "upper"))
     # Never narrower than the noise: 1.7 standard deviations of 0.02 to either side.
     assert (high - low >= 2 * 1.7 * 0.02 * (1 - 1e-9)).all()
