@@ -101,7 +101,8 @@ def test_prediction_csv_lies_here_unless_told(model, tmp_path, monkeypatch):
     assert (tmp_path / "prediction.csv").is_file()
 
 
-def test_a_proposed_input_is_read_as_it_is_written(tmp_path):
+@pytest.mark.parametrize("asked", [(), ("--input", "input")])
+def test_a_proposed_input_is_read_as_it_is_written(tmp_path, asked):
     path, out = tmp_path / "m.json", tmp_path / "p.csv"
     write_json(path, exported_of(example_model(1), input_scale=0.001))
     u = example_input(1)
@@ -109,7 +110,7 @@ def test_a_proposed_input_is_read_as_it_is_written(tmp_path):
     text = proposed.read_text().replace("current_A", "input")
     proposed.write_text(text)
 
-    assert predict(path, proposed, "--out", out).exit_code == 0
+    assert predict(path, proposed, "--out", out, *asked).exit_code == 0
     # It is in the unit that the model takes, not in that of the files.
     assert predicted(out) == pytest.approx(simulate(load_model(path), u), abs=1e-12)
 
