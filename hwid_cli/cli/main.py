@@ -170,6 +170,8 @@ def main(ctx: click.Context) -> None:
     the cache what it has computed before. Results go to stdout, progress to stderr.
     """
     ctx.obj = set_log_levels
+    # Of commands without these options, too.
+    set_log_levels(verbose=False, quiet=False)
 
 
 for _command in COMMANDS.values():

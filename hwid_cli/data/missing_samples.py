@@ -64,25 +64,42 @@ def bridge_missing(
     changed: dict[str, MeasuredColumn] = {}
     for role in ROLES:
         column = getattr(columns, role)
-        if column is not None and (is_none := _says_none(column.values)).any():
-            column = replace(column, values=np.where(is_none, np.nan, column.values))
-            changed[role] = column
-        places = np.zeros(0, int) if column is None else _bridged(column)
-        if column is None or places.size == 0:
+        if column is None:
             continue
-        values = column.values.copy()
-        known = np.flatnonzero(np.isfinite(values))
-        values[places] = np.interp(places, known, values[known])
-        changed[role] = replace(column, values=values)
-        bridged[role] = tuple(int(place) for place in places)
-        more = f" (and {places.size - 1} more)" if places.size > 1 else ""
-        _log.warning(
-            "%s: %s has no number%s; a straight line bridges it",
-            place_of(path, column, int(places[0])),
-            column.title,
-            more,
-        )
+        changed[role], places = bridge_column(path, column)
+        if places:
+            bridged[role] = places
     return replace(columns, **changed), bridged
+
+
+def bridge_column(
+    path: Path, column: MeasuredColumn
+) -> tuple[MeasuredColumn, tuple[int, ...]]:
+    """Bridge a few missing samples of one column, and say so.
+
+    Returns
+    -------
+    MeasuredColumn
+        As it is where it lacks more.
+    tuple of int, [samples]
+        That were bridged.
+    """
+    if (is_none := _says_none(column.values)).any():
+        column = replace(column, values=np.where(is_none, np.nan, column.values))
+    places = _bridged(column)
+    if places.size == 0:
+        return column, ()
+    values = column.values.copy()
+    known = np.flatnonzero(np.isfinite(values))
+    values[places] = np.interp(places, known, values[known])
+    more = f" (and {places.size - 1} more)" if places.size > 1 else ""
+    _log.warning(
+        "%s: %s has no number%s; a straight line bridges it",
+        place_of(path, column, int(places[0])),
+        column.title,
+        more,
+    )
+    return replace(column, values=values), tuple(int(place) for place in places)
 
 
 def _says_none(values: np.ndarray) -> np.ndarray:

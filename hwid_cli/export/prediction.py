@@ -9,6 +9,7 @@ import numpy as np
 
 from hwid_cli.data.columns import MeasuredColumn, keep_rows, place_of
 from hwid_cli.data.formats import read_columns, tables_of
+from hwid_cli.data.missing_samples import bridge_column
 from hwid_cli.data.units import factor_between, in_unit, is_unitless
 from hwid_cli.errors import ConfigError, MeasurementError, MissingColumnError
 from hwid_cli.files.csv_tables import write_table_csv
@@ -97,14 +98,15 @@ def read_input(
         found = read_columns(path, _in_table(path, wanted, source.table))
     except MissingColumnError as error:
         raise MeasurementError(f"{error}{_other_names(columns, source)}") from None
-    _check_numbers(path, found.input)
-    values = _as_in_its_files(path, found.input, exported.card) / scale
+    given, _ = bridge_column(path, found.input)
+    _check_numbers(path, given)
+    values = _as_in_its_files(path, given, exported.card) / scale
     if found.time is None:
         return step * np.arange(values.size), values
-    n, time = found.input.values.size, _in_seconds(path, found.time, exported.card)
+    n, time = values.size, _in_seconds(path, found.time, exported.card)
     if time.values.size < n:
         raise MeasurementError(
-            f"{path}: {found.input.title} has {n} values and {time.title} "
+            f"{path}: {given.title} has {n} values and {time.title} "
             f"{time.values.size}; expected a time for each; fill or cut the columns"
         )
     # Raw measurements may go on with the output for a while.

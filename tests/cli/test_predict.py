@@ -115,6 +115,26 @@ def test_a_proposed_input_is_read_as_it_is_written(tmp_path, asked):
     assert predicted(out) == pytest.approx(simulate(load_model(path), u), abs=1e-12)
 
 
+@pytest.mark.parametrize(("lost", "is_bridged"), [(2, True), (30, False)])
+def test_a_sample_that_the_input_lacks_is_bridged_and_said(
+    model, tmp_path, lost, is_bridged
+):
+    u = np.sin(np.arange(400) / 20.0)
+    u[100 : 100 + lost] = np.nan
+    given = write_input(tmp_path / "u.csv", u)
+    result = predict(model, given, "--out", tmp_path / "p.csv")
+
+    assert result.exit_code == (0 if is_bridged else 1)
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.startswith(f"hwid: {given}, row 102: input 'current_A'")
+    if is_bridged:
+        assert "has no number (and 1 more); a straight line bridges it" in result.stderr
+        line = np.interp([100, 101], [99, 102], u[[99, 102]])
+        u[100:102] = line
+        expected = simulate(load_model(model), u)
+        assert predicted(tmp_path / "p.csv") == pytest.approx(expected, abs=1e-12)
+
+
 def test_a_scale_of_the_configuration_is_applied(tmp_path):
     path = tmp_path / "m.json"
     write_json(path, exported_of(example_model(1), input_scale=0.001))
