@@ -32,6 +32,7 @@ from hwid_cli.diagnosis.sentences import (
     imitated_in_words,
     law_in_words,
     left_out,
+    stops_in_the_middle,
     summarise,
     taken_up,
     unseen_beside,
@@ -191,7 +192,9 @@ class Findings:
         self, parameters: Sequence[BaseParameter], effects: Sequence[FittedEffect]
     ) -> tuple[str, ...]:
         """What a reader has to know, of how it was judged and of the values."""
-        sample_time_s = min(one.sample_time_s for one in self.problem.signals)
+        signals = self.problem.signals
+        sample_time_s = min(one.sample_time_s for one in signals)
+        farthest_m = max(float(np.max(np.abs(one.position))) for one in signals)
         return (
             *self.warnings,
             *found_start(self.problem),
@@ -200,6 +203,7 @@ class Findings:
             *untold_command(self.problem, self.is_untold),
             *doubtful_values(parameters, self.problem.drive),
             *hardly_late(effects, sample_time_s),
+            *stops_in_the_middle(effects, farthest_m),
         )
 
     def trust(self) -> tuple[ModelTrust | None, TrustOnTests]:

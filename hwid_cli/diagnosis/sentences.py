@@ -27,6 +27,7 @@ from hwid_cli.records.diagnosis import (
     Law,
 )
 from hwid_cli.records.drive import HELD, LINE, Drive, StandIn
+from hwid_cli.records.units import as_percent
 
 # What moves and what drives it, by axis.
 _WORDS = {
@@ -49,6 +50,8 @@ _DOUBTFUL = 3.0
 # machine, [-].
 _MAKE_LATE = ("input_delay", "actuator_lag", "sensor_lag")
 _HARDLY_LATE = 0.2
+# Share of the farthest displacement below which a stop begins in the middle of the way.
+_MIDDLE = 0.05
 # Values that a wrong mass moves, in a drive with a spring; and how far apart they may
 # have moved, [-].
 _PROPORTIONAL = 3
@@ -420,6 +423,31 @@ def hardly_late(
         "or when the logger reads, may be all of it"
         for name, share in shares.items()
     )
+
+
+def stops_in_the_middle(
+    effects: Sequence[FittedEffect], farthest_m: float
+) -> tuple[str, ...]:
+    """Say that a curved contact on both sides which begins at once is a spring's law.
+
+    Parameters
+    ----------
+    farthest_m : float, [m]
+        Largest displacement of all recordings.
+    """
+    said = []
+    for effect in effects:
+        values = {one.name: one.value for one in effect.parameters}
+        place, exponent = values.get("position_m", np.inf), values.get("exponent", 1.0)
+        is_spring = effect.id == "end_stop" and exponent > 1.0
+        if is_spring and place <= _MIDDLE * farthest_m:
+            share = as_percent(place / farthest_m)
+            said.append(
+                f"end_stop begins at {share} of the way: it is no stop but a spring that "
+                f"hardens from the middle on, with the power {exponent:.3g} "
+                "(cubic_stiffness has 3)"
+            )
+    return tuple(said)
 
 
 def _is_the_mass(moved: Mapping[BaseParameter, float], drive: Drive) -> bool:

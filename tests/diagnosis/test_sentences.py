@@ -15,6 +15,7 @@ from hwid_cli.diagnosis.sentences import (
     doubtful_values,
     hardly_late,
     hidden_from_view,
+    stops_in_the_middle,
     unseen_beside,
 )
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
@@ -171,6 +172,30 @@ def test_what_shifts_a_signal_by_a_small_part_of_a_sample_is_questioned(
     found = FittedEffect(effect, "", "", (FittedParameter("a", value, 0.0, 1.0),))
     texts = hardly_late([found], 1e-3)
     assert [one.split(":")[0] for one in texts] == ([] if said is None else [said])
+
+
+@pytest.mark.parametrize(
+    ("effect", "place", "exponent", "is_said"),
+    [
+        ("end_stop", 3e-4, 2.75, True),
+        # A stop in the middle, straight; one farther out; a spring on one side.
+        ("end_stop", 3e-4, 1.0, False),
+        ("end_stop", 9e-3, 1.5, False),
+        ("one_sided_stop", 3e-4, 2.75, False),
+    ],
+)
+def test_a_curved_stop_that_begins_at_once_is_a_spring(
+    effect, place, exponent, is_said
+):
+    values = {"position_m": place, "exponent": exponent}
+    parameters = tuple(
+        FittedParameter(name, one, 0.0, 1.0) for name, one in values.items()
+    )
+    texts = stops_in_the_middle([FittedEffect(effect, "", "", parameters)], 0.0148)
+    assert len(texts) == is_said
+    for text in texts:
+        assert text.startswith("end_stop begins at 2 % of the way: it is no stop but a")
+        assert "the power 2.75" in text
 
 
 @pytest.mark.parametrize(
