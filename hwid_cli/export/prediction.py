@@ -1,6 +1,7 @@
 """The input that a prediction reads, and the file that it writes."""
 
 import csv
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +18,8 @@ from hwid_cli.records.experiment import Columns
 from hwid_cli.records.exported import Exported, ModelCard
 from hwid_cli.records.next import PROPOSED_COLUMNS
 from hwid_cli.records.trust import Band
+
+_log = logging.getLogger(__name__)
 
 # A time column may jitter by this share of a step, and differ so much in its mean step.
 _TOLERANCE = 0.01
@@ -183,6 +186,12 @@ def _as_in_its_files(path: Path, column: MeasuredColumn, card: ModelCard) -> np.
             f"expected {before!r}, or a unit that goes into it, as the model was made "
             "with; correct the file"
         )
+    if factor_between(unit, before) != 1.0:
+        _log.warning(
+            "%s: %s is in %s, as %s says; it is converted to %s, in which the model's own "
+            "files are",
+            path, column.title, unit, column.unit_said_by, before,
+        )  # fmt: skip
     return np.asarray(in_unit(column.values, unit, before))
 
 

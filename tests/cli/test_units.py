@@ -272,6 +272,8 @@ def test_a_prediction_takes_any_unit_that_goes_into_the_models(tmp_path):
         result = CliRunner().invoke(main, arguments)
         if result.exit_code:
             return result.stderr
+        is_other = heads[-1].endswith("A") and not heads[-1].endswith("mA")
+        assert ("it is converted to mA" in result.stderr) == is_other
         return np.genfromtxt(target, delimiter=",", names=True)["predicted"]
 
     as_before = predicted(["t,i"], (1e3, 1e3))
