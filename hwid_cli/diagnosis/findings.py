@@ -61,7 +61,7 @@ from hwid_cli.records.diagnosis import (
     Place,
     RecordingGap,
 )
-from hwid_cli.records.drive import Drive
+from hwid_cli.records.drive import BASE_PARAMETERS, Drive
 from hwid_cli.records.own_effects import is_own, own_of
 from hwid_cli.records.trust import ModelTrust, TrustOnTests
 from hwid_cli.records.units import behind
@@ -380,7 +380,11 @@ def _base(
 ) -> tuple[BaseParameter, ...]:
     refitted, after = fitted_drive(drive, base), fitted_drive(drive, chosen)
     found = []
-    for name in drive.fitted_base:
+    names = drive.fitted_base
+    if drive.is_mass_free:
+        # Known, so it stays; it is what the mass was fitted beside.
+        names = tuple(dict.fromkeys((*names, *BASE_PARAMETERS)))
+    for name in names:
         factor = _mean_factor(chosen, name)
         low, high = ends.get(name, (np.nan, np.nan))
         found.append(

@@ -34,6 +34,8 @@ _REST = 1e-3
 # Samples whose level is that of a rest, and the standard errors by which that of their
 # halves may differ: so far a slow rise moves it by less than one sample's noise.
 _LEAST_REST, _SAME_LEVEL = 40, 2.0
+# Share of the way of a recording beyond which it has moved before its input has.
+_FAR = 0.01
 # Every third recording of a kind validates; amplitudes and speeds take turns.
 _EVERY = 3
 _SAME = 0.05
@@ -231,8 +233,9 @@ class Signals:
         if self.is_velocity:
             return 0.0
         rest = self.output[: max(1, rest_length(self.driven_by))]
-        # In a few samples nothing gets far.
-        return float(np.mean(rest)) if rest.size < _LEAST_REST else level_of_rest(rest)
+        return (
+            level_of_rest(rest) if _goes_far(rest, self.output) else float(rest.mean())
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -582,6 +585,15 @@ def level_of_rest(values: np.ndarray) -> float:
         found = (first + second) / 2.0
         n *= 2
     return found
+
+
+def _goes_far(rest: np.ndarray, output: np.ndarray) -> bool:
+    """Whether an output moves before its input does: nothing holds it there."""
+    if rest.size < _LEAST_REST:
+        return False
+    first, *_, last = np.array_split(rest, 4)
+    way = abs(float(last.mean() - first.mean()))
+    return way > _FAR * float(np.ptp(output))
 
 
 def rest_length(driven_by: np.ndarray) -> int:

@@ -352,14 +352,26 @@ def test_a_simulation_may_leave_out_what_completes_a_law(effects, names):
 
 @pytest.mark.thorough
 def test_a_known_parameter_stays_where_data_would_move_it():
-    # A force constant that is 6 % too large, held to 2 %: its neighbours take the rest.
+    # A spring that is 6 % too stiff, held to 2 %: its neighbours take the rest.
+    wrong = simulation(stiffness_N_per_m=1255.0, known={"stiffness_N_per_m": 0.02})
+    after = {one.name: one.after for one in diagnosed(recordings(), wrong).base}
+    # At its bound, but for the rounding of a logarithm.
+    assert after["stiffness_N_per_m"] == pytest.approx(1255.0 * 0.98, rel=1e-12)
+    assert after["force_constant_N_per_A"] > 5.0 * 1.01
+
+
+@pytest.mark.thorough
+def test_a_known_force_constant_stays_and_the_mass_goes_with_it():
     wrong = simulation(
         force_constant_N_per_A=5.3, known={"force_constant_N_per_A": 0.02}
     )
-    after = {one.name: one.after for one in diagnosed(recordings(), wrong).base}
-    # At its bound, but for the rounding of a logarithm.
-    assert after["force_constant_N_per_A"] == pytest.approx(5.3 * 0.98, rel=1e-12)
-    assert after["stiffness_N_per_m"] > 1184.0 * 1.01
+    found = diagnosed(recordings(), wrong)
+    after = {one.name: one.after for one in found.base}
+    assert found.verdict == "parameters"
+    assert after["force_constant_N_per_A"] == 5.3
+    # Recordings tell the ratios to the mass of 0.3 kg beside 5 N/A.
+    assert after["mass_kg"] == pytest.approx(0.3 * 1.06, rel=2e-3)
+    assert after["stiffness_N_per_m"] == pytest.approx(1184.0 * 1.06, rel=2e-3)
 
 
 @pytest.mark.thorough
