@@ -62,7 +62,7 @@ def test_without_a_time_column_samples_count(tmp_path):
         (rows(1.0, head="time_s,amps"), "has no column 'current_A' for the input"),
         (rows(1.0, head="t,current_A"), "has no column 'time_s' for the time"),
         (rows(1.0, "x", 2.0), "row 3: input 'current_A' is 'x'; expected a finite"),
-        (rows(1.0, "nan", 2.0), "row 3: input 'current_A' is 'nan'"),
+        (rows(1.0, 2.0, "nan"), "row 4: input 'current_A' is 'nan'"),
         (rows(1.0, 1.0, 1.0, step=0.002), r"steps by 0.002 s; expected 0.001 s"),
         ("time_s,current_A\n0,1\n0.001,1\n0.002,1\n0.005,1\n", "row 5: .*by 0.003 s"),
         ("time_s,current_A\n0,1\n,1\n", "2 values and time 'time_s' 1|'' is|is ''"),
