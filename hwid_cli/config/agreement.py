@@ -230,7 +230,7 @@ def _cut_or_parts(experiment: Experiment) -> Iterator[Fault]:
         )
 
 
-def _delay_grid(experiment: Experiment) -> Iterator[Fault]:
+def _order_grid(experiment: Experiment) -> Iterator[Fault]:
     options = experiment.orders
     pairs = len(options.nb) * len(options.nk)
     if pairs > MOST_PAIRS:
@@ -406,7 +406,7 @@ _AGREEMENTS = (
     _Agreement(_range, "recordings.first_sample recordings.last_sample"),
     _Agreement(_parts, "recordings.parts"),
     _Agreement(_cut_or_parts, "recordings.first_sample recordings.last_sample"),
-    _Agreement(_delay_grid, "orders.nk_role orders.nf fit.delays"),
+    _Agreement(_order_grid, "orders.nk_role orders.nf fit.delays"),
     _Agreement(_linear_block, f"{_GRID} fit.linear_block"),
     _Agreement(_keep, "group.keep"),
     _Agreement(circuit_faults, "simulation.resistance_ohm"),
