@@ -230,7 +230,7 @@ def _cut_or_parts(experiment: Experiment) -> Iterator[Fault]:
         )
 
 
-def _order_grid(experiment: Experiment) -> Iterator[Fault]:
+def _pairs_of_orders(experiment: Experiment) -> Iterator[Fault]:
     options = experiment.orders
     pairs = len(options.nb) * len(options.nk)
     if pairs > MOST_PAIRS:
@@ -241,6 +241,10 @@ def _order_grid(experiment: Experiment) -> Iterator[Fault]:
             f"at most {MOST_PAIRS}",
             "narrow the ranges, or list fewer values, as nb: [1, 2, 5, 10, 20]",
         )
+
+
+def _delay_grid(experiment: Experiment) -> Iterator[Fault]:
+    options = experiment.orders
     if options.nk_role == "delay" and options.nf is None:
         yield missing(("orders", "nf"), "the number of poles, because nk_role is delay")
     if options.nk_role != "delay" and options.nf is not None:
@@ -406,7 +410,8 @@ _AGREEMENTS = (
     _Agreement(_range, "recordings.first_sample recordings.last_sample"),
     _Agreement(_parts, "recordings.parts"),
     _Agreement(_cut_or_parts, "recordings.first_sample recordings.last_sample"),
-    _Agreement(_order_grid, "orders.nk_role orders.nf fit.delays"),
+    _Agreement(_pairs_of_orders, "orders.nb orders.nk"),
+    _Agreement(_delay_grid, "orders.nk_role orders.nf fit.delays"),
     _Agreement(_linear_block, f"{_GRID} fit.linear_block"),
     _Agreement(_keep, "group.keep"),
     _Agreement(circuit_faults, "simulation.resistance_ohm"),
