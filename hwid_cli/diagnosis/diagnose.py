@@ -37,6 +37,7 @@ from hwid_cli.diagnosis.held_command import (
     other_command,
     with_held_command,
 )
+from hwid_cli.diagnosis.held_out import held_out_names
 from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
 from hwid_cli.diagnosis.judgement import decided, is_lost
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
@@ -66,7 +67,6 @@ from hwid_cli.diagnosis.pieces_search import (
 from hwid_cli.diagnosis.problem import (
     Compared,
     DiagnosisProblem,
-    held_out_names,
     prepare,
 )
 from hwid_cli.diagnosis.residual_noise import residual_noise

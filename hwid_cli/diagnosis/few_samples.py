@@ -5,7 +5,8 @@ from itertools import zip_longest
 
 import numpy as np
 
-from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
+from hwid_cli.diagnosis.rests import rest_length
 
 # Recordings that few samples are taken of, at least, and samples of each.
 FEWEST_RECORDINGS = 6

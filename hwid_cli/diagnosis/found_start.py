@@ -11,7 +11,8 @@ import numpy as np
 
 from hwid_cli.diagnosis.base_fit import compared_as_given
 from hwid_cli.diagnosis.noise import noise_floor
-from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
+from hwid_cli.diagnosis.rests import rest_length
 from hwid_cli.records.drive import StandIn
 
 # What is seen in first samples has to be so many times its error.

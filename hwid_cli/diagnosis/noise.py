@@ -17,7 +17,8 @@ from hwid_cli.diagnosis.differences import (
     difference_rms,
     differences_rms,
 )
-from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals, rest_length
+from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
+from hwid_cli.diagnosis.rests import rest_length
 from hwid_cli.diagnosis.whiteness import (
     MORE_THAN_QUIETEST,
     QUIETEST,

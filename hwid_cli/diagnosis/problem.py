@@ -1,9 +1,6 @@
-"""What a diagnosis works on: recordings, the drive, and what is compared.
+"""What a diagnosis works on: recordings, the drive, and what is compared."""
 
-Whole recordings are held out, spread over kinds, sizes and speeds.
-"""
-
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
@@ -13,6 +10,11 @@ import scipy
 
 from hwid_cli.diagnosis.differences import differences_rms
 from hwid_cli.diagnosis.innovations import Whitening
+from hwid_cli.diagnosis.rests import (
+    position_of_rest,
+    rest_length,
+    with_level_of_rest,
+)
 from hwid_cli.drive.simulation import NO_FORCE, refined
 from hwid_cli.records.axis import base_of, name_inside
 from hwid_cli.records.drive import (
@@ -29,26 +31,8 @@ from hwid_cli.records.recordings import Recording
 # Samples that are not used are bridged for a filter up to so many from one that is: damage
 # takes one or two, longer ones are sound and only not evaluated, [samples].
 _BRIDGED = 2
-# Share of the range of a signal below which a change is rest.
-_REST = 1e-3
-# Samples whose level is that of a rest, and the standard errors by which that of their
-# halves may differ: so far a slow rise moves it by less than one sample's noise.
-_LEAST_REST, _SAME_LEVEL = 40, 2.0
-# Share of the way of a recording beyond which it has moved before its input has.
-_FAR = 0.01
-# Every third recording of a kind validates; amplitudes and speeds take turns.
-_EVERY = 3
-_SAME = 0.05
-# Extremes that training recordings come near to, by this share of the largest.
-_NEARLY = 0.95
 # All move in one direction if the way back is no longer than this share of the way, [-].
 _WAY_BACK = 0.05
-_EXTREMES: tuple[Callable[[Recording], float], ...] = (
-    lambda one: float(np.max(one.output) - one.output[0]),
-    lambda one: float(one.output[0] - np.min(one.output)),
-    lambda one: float(np.max(np.abs(one.input))),
-    lambda one: float(np.max(np.abs(np.diff(one.output)))) / one.sample_time_s,
-)
 
 
 class HasMotion(Protocol):
@@ -226,16 +210,10 @@ class Signals:
 
     @cached_property
     def rest_position_m(self) -> float:
-        """Level of the position before input or position first move; of a velocity 0.
-
-        A free axis moves under an input that is constant from its first sample on.
-        """
+        """Level of the position before input or position first move; of a velocity 0."""
         if self.is_velocity:
             return 0.0
-        rest = self.output[: max(1, rest_length(self.driven_by))]
-        return (
-            level_of_rest(rest) if _goes_far(rest, self.output) else float(rest.mean())
-        )
+        return position_of_rest(self.driven_by, self.output)
 
 
 @dataclass(frozen=True, eq=False)
@@ -538,196 +516,3 @@ def _signals(
         is_held_out=recording.name in held_out,
         is_velocity=simulation.output == "velocity",
     )
-
-
-def with_level_of_rest(driven_by: np.ndarray) -> np.ndarray:
-    """Copy of an input that begins with the level at which it rests.
-
-    A drive starts in equilibrium with the first sample. The noise of that one sample would
-    move it, and where friction holds it there it stays.
-
-    Parameters
-    ----------
-    driven_by : ndarray, shape (n_samples,)
-
-    Returns
-    -------
-    ndarray, shape (n_samples,)
-        The same numbers where the input is free of noise, or moves at once.
-    """
-    found = np.array(driven_by, dtype=float)
-    found[0] = level_of_rest(driven_by)
-    return found
-
-
-def level_of_rest(values: np.ndarray) -> float:
-    """Level of the first samples, for as long as a signal rests.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n_samples,)
-
-    Returns
-    -------
-    float
-        The first sample itself where the signal is free of noise, or moves at once.
-    """
-    found = float(values[0])
-    n = _LEAST_REST
-    # As long as both halves have the same level, the signal rests.
-    while n <= values.size:
-        first, second = (float(np.mean(one)) for one in np.split(values[:n], 2))
-        bends = np.diff(values[:n], 4)
-        # White noise is 70 times as strong in its fourth differences.
-        noise = float(np.sqrt(np.mean(bends**2) / 70.0))
-        if noise == 0.0 or abs(second - first) > _SAME_LEVEL * 2.0 * noise / n**0.5:
-            break
-        found = (first + second) / 2.0
-        n *= 2
-    return found
-
-
-def _goes_far(rest: np.ndarray, output: np.ndarray) -> bool:
-    """Whether an output moves before its input does: nothing holds it there."""
-    if rest.size < _LEAST_REST:
-        return False
-    first, *_, last = np.array_split(rest, 4)
-    way = abs(float(last.mean() - first.mean()))
-    return way > _FAR * float(np.ptp(output))
-
-
-def rest_length(driven_by: np.ndarray) -> int:
-    """Count the samples before an input first moves.
-
-    Parameters
-    ----------
-    driven_by : ndarray, shape (n_samples,)
-
-    Returns
-    -------
-    int, [samples]
-        The sample from which it moves counts as well: there it has not moved yet.
-    """
-    size = float(np.max(np.abs(driven_by - driven_by[0])))
-    moved = np.flatnonzero(np.abs(driven_by - driven_by[0]) > _REST * size)
-    return int(moved[0]) if moved.size else int(driven_by.size)
-
-
-def held_out_names(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Names of the recordings that are held out.
-
-    Within each kind of recording, amplitudes and speeds of change are numbered; a
-    recording is held out where the sum of its two numbers is a multiple of three, so
-    that every amplitude and every speed is on both sides where the plan is a table. Of few
-    recordings chance may choose most; at most half are held out. Of recordings that are
-    each of a kind of their own it would choose one; at least a quarter are held out.
-
-    Returns
-    -------
-    tuple of str
-        In the order of the recordings; empty for a single recording.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> ramp = np.linspace(0, 1, 50)
-    >>> names = [Recording(f"r{k}", k * ramp, ramp, 1e-3) for k in (1, 2, 3)]
-    >>> held_out_names(names)
-    ('r2',)
-    """
-    chosen: set[str] = set()
-    for kind in dict.fromkeys(one.kind for one in recordings):
-        members = [one for one in recordings if one.kind == kind]
-        if len(members) > 1:
-            chosen |= _of_kind(members)
-    if not chosen and len(recordings) > 1:
-        chosen = {recordings[-1].name}
-    kept = _at_most_half(recordings, _without_extremes(recordings, chosen))
-    chosen = _at_least_a_quarter(recordings, kept) or chosen
-    return tuple(one.name for one in recordings if one.name in chosen)
-
-
-def _without_extremes(recordings: Sequence[Recording], chosen: set[str]) -> set[str]:
-    """Give back what alone goes to an extreme: training has to see all of the range.
-
-    A stop that only held-out recordings reach can never be found.
-    """
-    held_out = set(chosen)
-    for extreme in _EXTREMES:
-        sizes = {one.name: extreme(one) for one in recordings}
-        largest = max(sizes.values())
-        reached = [name for name in sizes if sizes[name] >= _NEARLY * largest]
-        if largest > 0 and all(name in held_out for name in reached):
-            held_out.discard(max(sizes, key=lambda name: sizes[name]))
-    return held_out
-
-
-def _at_most_half(recordings: Sequence[Recording], chosen: set[str]) -> set[str]:
-    """Give back what is too many, small and large ones alike: a fit needs the others."""
-    most = max(1, len(recordings) // 2)
-    if len(chosen) <= most:
-        return chosen
-    ones = [one for one in recordings if one.name in chosen]
-    by_size = sorted(ones, key=lambda one: float(np.max(np.abs(one.input))))
-    kept = np.rint(np.linspace(0, len(by_size) - 1, most)).astype(int)
-    return {by_size[row].name for row in kept}
-
-
-def _at_least_a_quarter(recordings: Sequence[Recording], chosen: set[str]) -> set[str]:
-    """Hold out more where chance has chosen few: of middle size, as training shows.
-
-    What is not the last of its kind first: one recording judges little.
-    """
-    held_out = set(chosen)
-    sizes = {one.name: float(np.max(np.abs(one.input))) or 1.0 for one in recordings}
-    middle = float(np.median(list(sizes.values())))
-
-    def is_last(one: Recording) -> bool:
-        kind = [two for two in recordings if two.kind == one.kind]
-        return sum(two.name not in held_out for two in kind) == 1
-
-    tried = set(held_out)
-    while len(held_out) < len(recordings) // 4 and len(tried) < len(recordings):
-        left = [one for one in recordings if one.name not in tried]
-        ranks = [(is_last(one), abs(np.log(sizes[one.name] / middle))) for one in left]
-        name = left[min(range(len(left)), key=ranks.__getitem__)].name
-        tried.add(name)
-        if name in _without_extremes(recordings, held_out | {name}):
-            held_out.add(name)
-    return held_out
-
-
-def _of_kind(members: Sequence[Recording]) -> set[str]:
-    sizes = _levels([float(np.max(np.abs(one.input))) for one in members])
-    speeds = _levels([_speed(one) for one in members])
-    repeats: dict[tuple[int, int], int] = {}
-    turns = []
-    for size, speed in zip(sizes, speeds, strict=True):
-        number = repeats.get((size, speed), 0)
-        repeats[size, speed] = number + 1
-        turns.append((size + speed + number) % _EVERY)
-    chosen = {one.name for one, turn in zip(members, turns, strict=True) if turn == 1}
-    if not chosen or len(chosen) == len(members):
-        return {members[len(members) // 2].name}
-    return chosen
-
-
-def _speed(recording: Recording) -> float:
-    """RMS of the input's change over that of the input: its mean frequency."""
-    moved = recording.input - recording.input[0]
-    size = float(np.sqrt(np.mean(moved**2))) or 1.0
-    change = float(np.sqrt(np.mean(np.diff(recording.input) ** 2)))
-    return change / size / recording.sample_time_s
-
-
-def _levels(values: Sequence[float]) -> list[int]:
-    """Number values by size; neighbours within 5 % are one level."""
-    order = np.argsort(values)
-    levels = [0] * len(values)
-    level, last = 0, None
-    for index in order:
-        value = values[int(index)]
-        if last is not None and value > last * (1 + _SAME):
-            level += 1
-        levels[int(index)], last = level, value
-    return levels

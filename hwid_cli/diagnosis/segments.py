@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hwid_cli.diagnosis.problem import Signals, rest_length
+from hwid_cli.diagnosis.problem import Signals
+from hwid_cli.diagnosis.rests import rest_length
 
 PARTS = ("rise", "hold", "fall", "rest")
 # An input that moves less than this share of its range within a window stands still.

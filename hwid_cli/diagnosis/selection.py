@@ -413,8 +413,7 @@ class SelectionCriteria:
         if self.ratio(found) <= STILL_LARGE:
             return LEAST_EXPLAINED
         # Beside a reading that errs, whatever is left moves the machine, and may be all.
-        (effect,) = found.effects or ("",)
-        errs = bool(effect) and CATALOGUE[effect].enters == "output"
+        errs = any(CATALOGUE[one].enters == "output" for one in found.effects)
         is_free = has_own_values(found)
         is_far = self.rms(found, held_out=True) > LARGE_SHARE_OF_MOTION * self.motion
         is_doubtful = is_free or is_far or errs

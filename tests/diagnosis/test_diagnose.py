@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.diagnose import allowed_effects, diagnose
-from hwid_cli.diagnosis.problem import held_out_names
+from hwid_cli.diagnosis.held_out import held_out_names
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.drive import Controller, StandIn
 from hwid_cli.records.experiment import DiagnoseOptions

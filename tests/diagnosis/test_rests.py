@@ -1,9 +1,10 @@
-"""A noisy first sample of the input moves no drive that rests."""
+"""Where signals rest; a noisy first sample of the input moves no drive that does."""
 
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.problem import Signals, prepare, with_level_of_rest
+from hwid_cli.diagnosis.problem import Signals, prepare
+from hwid_cli.diagnosis.rests import rest_length, with_level_of_rest
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import Drive
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -18,6 +19,19 @@ def noise_of(seed):
 
 def step_after(rest, height=1.0):
     return np.where(np.arange(N) < rest, 0.2, 0.2 + height)
+
+
+def test_the_rest_ends_where_the_input_has_moved():
+    assert rest_length(np.array([2.0, 2.0, 2.0, 3.0, 2.0])) == 3
+
+
+def test_a_change_below_a_thousandth_of_the_input_is_rest():
+    assert rest_length(np.array([0.0, 0.0009, 0.0, 1.0])) == 3
+    assert rest_length(np.array([0.0, 0.0011, 0.0, 1.0])) == 1
+
+
+def test_a_constant_input_rests_all_the_time():
+    assert rest_length(np.full(7, 2.0)) == 7
 
 
 def test_the_level_of_a_rest_is_its_mean():
