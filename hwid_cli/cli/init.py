@@ -11,7 +11,7 @@ from hwid_cli.config.starter import (
     starter_text,
     write_starter,
 )
-from hwid_cli.data.folder import guess_layout, list_measurements
+from hwid_cli.data.folder import STAR, guess_layout, list_measurements
 from hwid_cli.data.recordings import survey_recordings
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.starter import FolderLayout, Proposal
@@ -29,7 +29,10 @@ def write_starter_configuration(
     survey = survey_recordings(draft_experiment(layout, folder), folder)
     if not survey.recordings:
         raise MeasurementError(survey.problems[0])
-    proposal = propose(survey.recordings, survey.unusable, survey.problems)
+    may_cut = not layout.parts and layout.variable != STAR
+    proposal = propose(
+        survey.recordings, survey.unusable, survey.problems, may_cut=may_cut
+    )
     write_starter(out, starter_text(layout, proposal, folder, out), force=force)
     load_experiment(out)
     if not quiet:

@@ -20,6 +20,7 @@ from hwid_cli.config.simulation_checks import (
 from hwid_cli.data.units import factor_between, is_unitless, quantity_of
 from hwid_cli.files.messages import name_fault
 from hwid_cli.records.experiment import (
+    AS_FILE,
     MOST_PAIRS,
     Experiment,
     NextOptions,
@@ -151,7 +152,7 @@ def _units(experiment: Experiment) -> Iterator[Fault]:
         return
     for role in ("time", "input", "output"):
         unit, place = getattr(options.units, role), ("recordings", "units", role)
-        if unit is None or is_unitless(unit):
+        if unit is None or unit == AS_FILE or is_unitless(unit):
             continue
         if not quantity_of(unit) or (role == "time") != (quantity_of(unit) == "time"):
             expected = f"a unit such as {_EXAMPLES[role]}"

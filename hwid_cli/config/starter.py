@@ -12,7 +12,7 @@ from hwid_cli.data.units import QUANTITIES, quantity_of, readings_of
 from hwid_cli.errors import ConfigError
 from hwid_cli.files.atomic import replace_file
 from hwid_cli.files.messages import escaped, is_plain
-from hwid_cli.records.experiment import Experiment
+from hwid_cli.records.experiment import AS_FILE, Experiment
 from hwid_cli.records.recordings import KINDS
 from hwid_cli.records.starter import FolderLayout, Proposal, Role
 
@@ -234,14 +234,20 @@ def _units(layout: FolderLayout) -> dict[str, str]:
     """Units of the columns that are converted, by role."""
     roles = {"time": layout.time, "input": layout.input, "output": layout.output}
     return {
-        name: role.unit
+        name: AS_FILE if name in layout.mixed else role.unit
         for name, role in roles.items()
         if role is not None
         and (
-            quantity_of(role.unit) in _CONVERTED[name]
+            name in layout.mixed
+            or quantity_of(role.unit) in _CONVERTED[name]
             or (name == "input" and _is_reference(layout))
         )
     }
+
+
+def _unit_of_output(layout: FolderLayout) -> str:
+    """Unit of the output where it is converted; empty where it is a label."""
+    return layout.output.unit if "output" in _units(layout) else ""
 
 
 def _is_reference(layout: FolderLayout) -> bool:
@@ -342,9 +348,11 @@ def _role_lines(name: str, role: Role | None) -> list[str]:
 def _unit_lines(layout: FolderLayout) -> list[str]:
     lines, units = [], _units(layout)
     if units:
-        si = {one: QUANTITIES[quantity_of(unit)] for one, unit in units.items()}
+        stated = {one: getattr(layout, one).unit for one in units}
+        si = {one: QUANTITIES[quantity_of(unit)] for one, unit in stated.items()}
         lines += [
-            f"  units: {_flow(units)}   # as the file says",
+            f"  units: {_flow(units)}   # as the file says"
+            + ("; 'file': each its own" if layout.mixed else ""),
             f"  # All numbers here are in {', '.join(si.values())} after conversion.",
         ]
     for name, role in (("input", layout.input), ("output", layout.output)):
@@ -470,7 +478,7 @@ def _diagnose_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     return [
         *lines,
         "# simulation:",
-        *_drive_lines(_units(layout).get("output", ""), pushes=bool(push)),
+        *_drive_lines(_unit_of_output(layout), pushes=bool(push)),
         *(_CIRCUIT if unit == "V" else ()),
         "#   hold: auto               # linear or zero (held, as by a controller, PLC or",
         "#                            # D/A converter): say so where you know it",

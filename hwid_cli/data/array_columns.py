@@ -24,14 +24,16 @@ from hwid_cli.records.starter import FoundColumn
 
 # 2^26 numbers of 8 bytes: eight times the longest recording that was measured, 8e6
 # samples.
-_MOST_BYTES = 2**29
+MOST_BYTES = 2**29
 
 # A file's variables by name; each is loaded when it is asked for. Behind marks stand
 # attributes that say a unit or what a signal is called, and classes of objects that
 # cannot be read.
 Variables = Mapping[str, Callable[[], Any]]
 UNIT_MARK, TITLE_MARK, OBJECT_MARK = "@unit", "@title", "@object"
-_MARKS = (UNIT_MARK, TITLE_MARK, OBJECT_MARK)
+# Behind the number of an element that has a name of its own: it is listed by that.
+NAMED_MARK = "@named"
+_MARKS = (UNIT_MARK, TITLE_MARK, OBJECT_MARK, NAMED_MARK)
 # Members that hold the numbers of a signal whose unit stands beside them.
 _VALUES = ("value", "values", "data", "Value", "Values", "Data")
 
@@ -144,7 +146,11 @@ def list_variables(variables: Variables) -> Iterator[FoundColumn]:
     has_columns = False
     for name, load in variables.items():
         # A configuration takes no text with control characters.
-        if name.endswith(_MARKS) or not is_plain(name):
+        if (
+            name.endswith(_MARKS)
+            or not is_plain(name)
+            or name + NAMED_MARK in variables
+        ):
             continue
         values = np.asarray(_checked(name, load()))
         if values.dtype.names and values.ndim == 1:
@@ -229,8 +235,8 @@ def check_size(name: str, size: int) -> None:
     ----------
     size : int, [bytes]
     """
-    if size > _MOST_BYTES:
-        raise ValueError(f"{name!r} unpacks to more than {_MOST_BYTES // 2**20} MB")
+    if size > MOST_BYTES:
+        raise ValueError(f"{name!r} unpacks to more than {MOST_BYTES // 2**20} MB")
 
 
 def _checked(name: str, value: Any) -> Any:
@@ -246,7 +252,7 @@ def _is_group(name: str, variables: Variables) -> bool:
 
 
 def _names(variables: Variables) -> list[str]:
-    return [name for name in variables if not name.endswith(UNIT_MARK)]
+    return [name for name in variables if not name.endswith(_MARKS)]
 
 
 def _variable(path: Path, name: str, variables: Variables, role: str) -> Any:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hwid_cli.data.columns import ROLES, FileColumns, MeasuredColumn, place_of
-from hwid_cli.data.missing_samples import missing
+from hwid_cli.data.missing_samples import is_over_range, missing
 from hwid_cli.errors import MeasurementError
 from hwid_cli.files.messages import name_fault, shown
 from hwid_cli.records.experiment import (
@@ -62,6 +62,11 @@ def _run_of(column: MeasuredColumn, index: int) -> str:
     if not lost[index]:
         return ""
     run = int(np.argmin(np.append(lost[index:], False)))
+    if is_over_range(column, index):
+        return (
+            ": out of range, where a straight line would cut off the top (one sample "
+            "alone is bridged)"
+        )
     if run > 1:
         return f", as are {run} rows together (a few are bridged)"
     if lost.sum() > 1:

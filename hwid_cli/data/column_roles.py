@@ -252,6 +252,8 @@ def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
     if outputs:
         others = free or [one for one in named if one not in outputs] or outputs[1:]
         first = max(others, key=lambda one: _answer(one, outputs[0]))
+        if (driven := _driven_by_command(first, outputs)) is not None:
+            return first, driven, {"input": _IS_COMMAND, "output": _by(driven)}
         if (told := _told(named, first, outputs[0])) is not None:
             return told, outputs[0], {"input": _IS_COMMAND, "output": _by(outputs[0])}
         last, why = _chosen_output(first, [one for one in outputs if one != first])
@@ -268,6 +270,25 @@ def _pair(named: list[_Named]) -> tuple[_Named, _Named, dict[str, str]]:
     if len(pool) < 2:
         raise _too_few(len(pool), [one.column for one in named])
     return _by_content(pool)
+
+
+def _driven_by_command(first: _Named, outputs: Sequence[_Named]) -> _Named | None:
+    """An output that a command of another quantity drives; None where there is none.
+
+    The pressure that a valve was told to make, the one that it made, and the stroke of a
+    muscle: only the stroke is of the machine behind the valve.
+    """
+    if first.meaning.role != "reference" or not first.meaning.unit:
+        return None
+    units = [(one, one.meaning.unit) for one in outputs if one.meaning.rank <= OF_UNIT]
+    own = [one for one, unit in units if not _is_other(first.meaning.unit, unit)]
+    others = [one for one, unit in units if _is_other(first.meaning.unit, unit)]
+    return others[0] if own and others else None
+
+
+def _is_other(unit: str, of_another: str) -> bool:
+    """Whether units are known to be of two quantities."""
+    return bool(of_another) and factor_between(unit, of_another) is None
 
 
 def _told(named: list[_Named], first: _Named, last: _Named) -> _Named | None:

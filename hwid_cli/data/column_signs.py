@@ -32,6 +32,9 @@ MOST_REPEATED, MOST_ODD = 0.01, 0.02
 _FEWEST = 20
 # Recordings in one file, and the largest ratio of their steps.
 _MOST_RESTARTS, _SAME_STEP = 1000, 1.02
+# Longest stretch without a sample that a straight line may cross, [steps], or where that
+# is longer this share of a recording, [-].
+LONGEST_GAP, _LONGEST_PAUSE = 10.0, 0.01
 # Ticks of a clock that shows large ones only.
 _FEWEST_TICKS = 2
 
@@ -169,8 +172,25 @@ def coarse_clock_of(values: np.ndarray) -> float | None:
     return float(ticks.sum() / held.sum()) if is_even else None
 
 
+def are_pauses(steps: np.ndarray, step: float) -> np.ndarray:
+    """Which steps of a clock are pauses of a recording, and no samples that were lost.
+
+    Parameters
+    ----------
+    steps : ndarray, shape (n,), [any unit of time]
+    step : float, [as steps]
+        The usual one.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+    """
+    least = max(LONGEST_GAP, _LONGEST_PAUSE * steps.size)
+    return np.asarray(steps > least * step)
+
+
 def restarts_of(values: np.ndarray) -> tuple[int, ...]:
-    """Samples at which a column begins to tick again.
+    """Samples at which a column begins to tick again, from the start or after a pause.
 
     Parameters
     ----------
@@ -185,15 +205,19 @@ def restarts_of(values: np.ndarray) -> tuple[int, ...]:
     --------
     >>> restarts_of(np.tile(0.5 * np.arange(100), 3))
     (100, 200)
+    >>> restarts_of(np.r_[0:100, 150:250])
+    (100,)
     """
     if not np.isfinite(values).all():
         return ()
-    begins = np.flatnonzero(np.diff(values) < 0) + 1
+    steps = np.diff(values)
+    usual = float(np.median(steps)) if steps.size else 0.0
+    begins = np.flatnonzero((steps < 0) | are_pauses(steps, usual)) + 1
     if not 0 < begins.size <= _MOST_RESTARTS:
         return ()
     clocks = [clock_of(one) for one in np.split(values, begins)]
-    steps = [one.step for one in clocks if one is not None]
-    is_one = len(steps) == len(clocks) and max(steps) <= _SAME_STEP * min(steps)
+    ticks = [one.step for one in clocks if one is not None]
+    is_one = len(ticks) == len(clocks) and max(ticks) <= _SAME_STEP * min(ticks)
     return tuple(int(one) for one in begins) if is_one else ()
 
 

@@ -36,6 +36,7 @@ from hwid_cli.data.long_tables import (
     long_tables,
     pick_from_long,
 )
+from hwid_cli.data.packed import open_bytes, open_text
 from hwid_cli.data.table_columns import (
     ColumnParts,
     begun_together,
@@ -227,7 +228,7 @@ def _words_of(
     found: dict[int, list[str]] = {place: [] for place in places}
     wanted = iter(lines.tolist())
     line = next(wanted, None)
-    with sheet.path.open(encoding=sheet.encoding, errors="replace", newline="") as file:
+    with open_text(sheet.path, sheet.encoding) as file:
         for end, row in _cells_of(sheet.path, file, sheet.separator, 0):
             if end == line:
                 for place in places:
@@ -239,7 +240,7 @@ def _words_of(
 def _read_sheet(path: Path, wanted: Sequence[str]) -> _Sheet:
     """Find out the form of a file."""
     encoding = _encoding(path)
-    with path.open(encoding=encoding, errors="replace", newline="") as file:
+    with open_text(path, encoding) as file:
         lines = _telling(list(islice(file, _HEAD_LINES)))
     told_by = (tuple(lines), tuple(wanted))
     form = _forms.get(told_by)
@@ -337,7 +338,7 @@ def _plain_rows(mark: str, count: int) -> re.Pattern[str]:
 def _encoding(path: Path) -> str:
     """Encoding of a file: its mark, else UTF-8 where it is, else that of old Windows."""
     decoder = codecs.getincrementaldecoder("utf-8")()
-    with path.open("rb") as file:
+    with open_bytes(path) as file:
         begin = file.read(4)
         if begin.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
             return "utf-16"
@@ -507,7 +508,7 @@ def _read_body(
         begins = set()
     parts = ColumnParts(sheet.path, titles, _stamped(sheet, titles))
     number, damaged = sheet.first_line, 0
-    with sheet.path.open(encoding=sheet.encoding, errors="replace", newline="") as file:
+    with open_text(sheet.path, sheet.encoding) as file:
         for _ in islice(file, number):
             pass
         while lines := list(islice(file, _BLOCK_LINES)):

@@ -27,11 +27,13 @@ from hwid_cli.data.column_clocks import (
 from hwid_cli.data.column_roles import SignalGuess, guess_signals
 from hwid_cli.data.column_words import counts_recordings, meaning_of
 from hwid_cli.data.conditions import condition_notes
-from hwid_cli.data.formats import SUFFIXES, list_columns, reader_of
+from hwid_cli.data.formats import SUFFIXES, has_reader, list_columns, reader_of
 from hwid_cli.data.header_stamps import topic_of
+from hwid_cli.data.packed import stem_of
 from hwid_cli.data.recording_files import PLAN_NAME
 from hwid_cli.data.sampling import missing_samples
 from hwid_cli.data.split_files import split_recordings
+from hwid_cli.data.units import factor_between
 from hwid_cli.errors import ConfigError, MeasurementError, MissingLibraryError
 from hwid_cli.files.messages import escaped
 from hwid_cli.records.starter import FolderLayout, FoundColumn, FoundFile, Role
@@ -96,12 +98,12 @@ def _candidates(folder: Path, pattern: str) -> list[Path]:
         and not any(part.startswith(".") for part in path.relative_to(folder).parts)
         and path.is_file()
     )
-    return found if any(one.suffix.lower() in SUFFIXES for one in found) else []
+    return found if any(map(has_reader, found)) else []
 
 
 def _listed(path: Path, folder: Path) -> FoundFile:
     name = path.relative_to(folder).as_posix()
-    if path.suffix.lower() not in SUFFIXES:
+    if not has_reader(path):
         return FoundFile(name, problem=f"no reader for files named *{path.suffix}")
     try:
         columns = list_columns(path)
@@ -119,7 +121,7 @@ def _with_starred_tables(file: FoundFile) -> FoundFile:
 
     So does a table with the name of its file, which is another one in every file.
     """
-    stem = PurePosixPath(file.name).stem
+    stem = stem_of(PurePosixPath(file.name))
     for depth in range(1, _DEEPEST_TABLE + 1):
         tables: dict[str, dict[str | int, FoundColumn]] = {}
         for one in long_columns(file.columns):
@@ -257,7 +259,11 @@ def _layout_of_alike(
     used, left = _sorted_out(files, there, typical)
     layout = _layout(signals, clocks, (_patterns(used, files), left))
     conditions = condition_notes(used, {one.place for one in there.values()})
-    layout = replace(layout, notes=(*layout.notes, *conditions))
+    layout = replace(
+        layout,
+        notes=(*layout.notes, *conditions),
+        mixed=_of_mixed_units(used, there),
+    )
     layout = _in_parts(layout, used, there.get("time"))
     layout = _with_lost_samples(layout, used, there.get("time"))
     if layout.variable == STAR:
@@ -356,33 +362,11 @@ def _sorted_out(
             for name, found in begins.items()
             if found
         }
-    why |= _copies([one for one in used if not why[one.name]], roles)
     used = [one for one in used if not why[one.name]]
     left = tuple((name, reason) for name, reason in why.items() if reason)
     if not used:
         raise MeasurementError(f"{escaped(left[0][0])}: {left[0][1]}")
     return used, left
-
-
-def _copies(
-    files: Sequence[FoundFile], roles: Mapping[str, FoundColumn]
-) -> dict[str, str]:
-    """Files with the same numbers as another one, which has the shorter name.
-
-    A model that was fitted to one of them would be tested on the other.
-    """
-    places = {roles[role].place for role in ("input", "output")}
-    first: dict[tuple[bytes, ...], str] = {}
-    found = {}
-    for file in sorted(files, key=lambda one: (len(one.name), one.name)):
-        signals = [one for one in file.columns if one.place in places]
-        if not all(signs.changes(one.values) for one in signals):
-            continue
-        numbers = tuple(one.values.tobytes() for one in signals)
-        known = first.setdefault(numbers, file.name)
-        if known != file.name:
-            found[file.name] = f"holds the same numbers as {escaped(known)}"
-    return found
 
 
 def _begins(file: FoundFile, time: FoundColumn | None) -> tuple[int, ...]:
@@ -430,13 +414,15 @@ def _with_lost_samples(
         for column in long_columns(file.columns)
         if time is not None and column.place == time.place
     ]
+    if layout.parts:
+        cuts = layout.parts.values()
+        clocks = [(name, one[slice(*cut)]) for name, one in clocks for cut in cuts]
     ticks = [(name, values, signs.clock_of(values)) for name, values in clocks]
     is_rough = any(one and one.jitter > ROUND_STAMPS for _, _, one in ticks)
-    lost = {
-        name: count
-        for name, values, one in ticks
-        if one is not None and (count := missing_samples(values))
-    }
+    lost: Counter[str] = Counter()
+    for name, values, one in ticks:
+        if one is not None and (count := missing_samples(values)):
+            lost[name] += count
     if not lost:
         return replace(layout, resample=layout.resample or is_rough)
     shown = ", ".join(f"{n} in {escaped(name)}" for name, n in list(lost.items())[:4])
@@ -510,10 +496,26 @@ def _why_not(
                 return _too_short(short)
             return f"has no column {column.title or column.key!r} for the {role}"
         of_role = "time" if role == "output_time" else role
-        units = [unit_of_column(one, of_role) for one in (own[column.place], column)]
-        if units[0] != units[1]:
-            return f"its {role} is in {units[0]!r}, not in {units[1]!r}"
+        here, usual = (
+            unit_of_column(one, of_role) for one in (own[column.place], column)
+        )
+        if here != usual and factor_between(here, usual) is None:
+            return f"its {role} is in {here!r}, not in {usual!r}"
     return ""
+
+
+def _of_mixed_units(
+    files: Sequence[FoundFile], roles: Mapping[str, FoundColumn]
+) -> tuple[str, ...]:
+    """Roles whose unit is another one in some files."""
+
+    def units(role: str) -> set[str]:
+        place = roles[role].place
+        columns = [one for file in files for one in file.columns if one.place == place]
+        return {unit_of_column(one, role) for one in columns}
+
+    there = [role for role in ("time", "input", "output") if role in roles]
+    return tuple(role for role in there if len(units(role)) > 1)
 
 
 def _table(file: FoundFile) -> list[FoundColumn]:

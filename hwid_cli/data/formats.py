@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass, replace
 from fnmatch import fnmatchcase
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from hwid_cli.data.json_files import open_json
 from hwid_cli.data.mat_files import open_mat
 from hwid_cli.data.mdf_files import open_mdf
 from hwid_cli.data.npz_files import open_npz
+from hwid_cli.data.packed import ending_of, is_packed
 from hwid_cli.data.sheet_files import list_sheet_columns, read_sheet_columns
 from hwid_cli.data.tdms_files import open_tdms
 from hwid_cli.errors import MeasurementError, MissingLibraryError
@@ -55,6 +56,8 @@ class Reader:
         Whether a process of its own reads: for what a damaged file may crash.
     is_one_table : bool
         Whether columns of different length belong together.
+    may_be_packed : bool
+        Whether such a file may be packed by gzip.
     """
 
     suffixes: tuple[str, ...]
@@ -63,12 +66,14 @@ class Reader:
     needs: str = ""
     is_isolated: bool = False
     is_one_table: bool = False
+    may_be_packed: bool = False
 
 
 def _of_arrays(
     *suffixes: str,
     opened: Callable[[Path], AbstractContextManager[Variables]],
     needs: str = "",
+    may_be_packed: bool = False,
 ) -> Reader:
     """Reader of files that hold arrays with names."""
 
@@ -82,7 +87,14 @@ def _of_arrays(
         with opened(path) as variables:
             yield from list_variables(variables)
 
-    return Reader(suffixes, read, list_columns, needs, is_isolated=True)
+    return Reader(
+        suffixes,
+        read,
+        list_columns,
+        needs,
+        is_isolated=True,
+        may_be_packed=may_be_packed,
+    )
 
 
 READERS = (
@@ -91,6 +103,7 @@ READERS = (
         read_csv_columns,
         list_csv_columns,
         is_one_table=True,
+        may_be_packed=True,
     ),
     _of_arrays(".mat", opened=open_mat),
     _of_arrays(".npz", opened=open_npz),
@@ -103,7 +116,7 @@ READERS = (
         is_isolated=True,
         is_one_table=True,
     ),
-    _of_arrays(".jsonl", ".ndjson", ".json", opened=open_json),
+    _of_arrays(".jsonl", ".ndjson", ".json", opened=open_json, may_be_packed=True),
     _of_arrays(".tdms", opened=open_tdms, needs="npTDMS"),
     _of_arrays(".mf4", ".mdf", opened=open_mdf, needs="asammdf"),
     _of_arrays(".parquet", ".feather", ".arrow", opened=open_arrow, needs="pyarrow"),
@@ -117,7 +130,16 @@ _TOLD = ("title", "rows_from_zero", "unit", "unit_said_by")
 _ISOLATED = IsolatedReader("hwid_cli.data.formats")
 
 
-def reader_of(path: Path) -> Reader:
+def has_reader(path: PurePath) -> bool:
+    """Whether a reader knows a file by its ending."""
+    try:
+        reader_of(path)
+    except MeasurementError:
+        return False
+    return True
+
+
+def reader_of(path: PurePath) -> Reader:
     """Find the reader of a file by its ending.
 
     Raises
@@ -126,7 +148,9 @@ def reader_of(path: Path) -> Reader:
         If no reader knows it.
     """
     for reader in READERS:
-        if path.suffix.lower() in reader.suffixes:
+        if ending_of(path) in reader.suffixes:
+            if is_packed(path) and not reader.may_be_packed:
+                break
             return reader
     raise MeasurementError(
         f"{path}: has the ending {path.suffix!r}; expected one of "

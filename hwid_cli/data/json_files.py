@@ -5,6 +5,7 @@ number of the others says what all of them are: its ``units`` name those of the 
 """
 
 import json
+import logging
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -13,10 +14,20 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.data.array_columns import UNIT_MARK, Variables, check_size
+from hwid_cli.data.array_columns import (
+    MOST_BYTES,
+    UNIT_MARK,
+    Variables,
+    check_size,
+)
 from hwid_cli.data.cells import is_stamp, stamps_in_seconds
+from hwid_cli.data.packed import open_bytes
+
+_log = logging.getLogger(__name__)
 
 _UNITS = ("units", "unit")
+# Of the lines, records that a lost byte or a reset has torn, at most, [-].
+_MOST_TORN = 0.02
 
 
 @contextmanager
@@ -35,16 +46,44 @@ def open_json(path: Path) -> Iterator[Variables]:
         If it is no JSON, or too large.
     """
     check_size(path.name, path.stat().st_size)
-    text = path.read_text(encoding="utf-8-sig")
+    with open_bytes(path) as file:
+        # What is packed shows its size as it is read.
+        content = file.read(MOST_BYTES + 1)
+    check_size(path.name, len(content))
+    text = content.decode("utf-8-sig")
     try:
-        content = json.loads(text)
+        said = json.loads(text)
     except json.JSONDecodeError:
-        content = [json.loads(line) for line in text.splitlines() if line.strip()]
-    found, units = _columns(content)
+        said = _records_in(path, text.splitlines())
+    found, units = _columns(said)
     variables = {name: partial(np.asarray, values) for name, values in found.items()}
     for name, unit in units.items():
         variables[name + UNIT_MARK] = partial(np.asarray, unit)
     yield variables
+
+
+def _records_in(path: Path, lines: Sequence[str]) -> list[Any]:
+    """A record in each line; a few that are torn are left out, and said to be.
+
+    Raises
+    ------
+    ValueError
+        If more of them are none.
+    """
+    found, torn, fault = [], 0, ""
+    for number, line in enumerate(lines, 1):
+        if not line.strip():
+            continue
+        try:
+            found.append(json.loads(line))
+        except json.JSONDecodeError as error:
+            torn += 1
+            fault = fault or f"row {number}: {error.msg}"
+    if torn > _MOST_TORN * len(lines):
+        raise ValueError(fault)
+    if torn:
+        _log.warning("%s: %d torn records are left out (%s)", path, torn, fault)
+    return found
 
 
 def _columns(content: Any) -> tuple[dict[str, np.ndarray], dict[str, str]]:
@@ -73,7 +112,12 @@ def _of_records(
         for name in row:
             counts[name] = counts.get(name, 0) + 1
     names = [name for name, count in counts.items() if 2 * count > len(rows)]
-    samples = [row for row in rows if any(name in row for name in names)]
+    # What says that a run begins has a time, and no numbers of the signals.
+    samples = [
+        row
+        for row in rows
+        if 2 * sum(_is_value(row.get(name)) for name in names) >= len(names)
+    ]
     found = {name: _numbers([row.get(name) for row in samples]) for name in names}
     units: dict[str, str] = {}
     for one in records:
@@ -110,6 +154,12 @@ def _numbers(cells: Sequence[Any]) -> np.ndarray:
     if texts and all(map(is_stamp, texts)):
         return stamps_in_seconds([str(one) for one in cells])[0]
     return np.array([_number(one) for one in cells], dtype=float)
+
+
+def _is_value(cell: Any) -> bool:
+    if isinstance(cell, str) and is_stamp(cell):
+        return True
+    return bool(np.isfinite(_number(cell)))
 
 
 def _number(cell: Any) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hwid_cli.data.array_columns import (
+    NAMED_MARK,
     TITLE_MARK,
     UNIT_MARK,
     Variables,
@@ -112,8 +113,32 @@ def _with_members(name: str, value: Any) -> dict[str, Any]:
                 label = found.get(key.removesuffix(numbers) + words)
                 if label is not None and text_of(label):
                     found[key + TITLE_MARK] = label
+            found.update(_by_their_names(name, numbers, found))
     found.update(_experiments_of_iddata(name, found))
     return {**found, **_said_of_iddata(name, found)}
+
+
+def _by_their_names(
+    name: str, numbers: str, found: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Elements of an array of signals under the names of these, where no two share one.
+
+    The next file of the same layout may hold them in another order.
+    """
+    ends = f").{numbers}"
+    keys = [one for one in found if one.startswith(f"{name}(") and one.endswith(ends)]
+    labels = [text_of(found.get(key + TITLE_MARK)) for key in keys]
+    named = dict(zip([f"{name}.{label}" for label in labels], keys, strict=True))
+    if not all(labels) or len(named) < len(keys) or named.keys() & found.keys():
+        return {}
+    more: dict[str, Any] = {}
+    for called, key in named.items():
+        more |= {called: found[key], called + TITLE_MARK: found[key + TITLE_MARK]}
+        more[key + NAMED_MARK] = True
+        unit = found.get(key.removesuffix(numbers) + "Unit")
+        if unit is not None:
+            more[called + UNIT_MARK] = unit
+    return more
 
 
 def _experiments_of_iddata(name: str, found: Mapping[str, Any]) -> dict[str, Any]:

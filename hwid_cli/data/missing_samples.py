@@ -21,11 +21,15 @@ _log = logging.getLogger(__name__)
 # in a row the line would be a guess, [samples].
 _MOST_BRIDGED = 0.01
 _LONGEST_BRIDGE = 10
-# Instruments send 9.9E37 for overflow and 9.91E37 for no number (SCPI 1999, 7.2.1).
-_NO_NUMBER, _NO_MORE = 9.9e37, 1e38
+# Instruments send 9.9E37 for overflow and 9.91E37 for no number (SCPI 1999, 7.2.1);
+# loggers write 7.77777E+99 for a wire that is broken. Among others below this they are none.
+_NO_NUMBER, _LARGEST_NUMBER = 9.9e37, 1e30
 # Loggers write these, where they are farther from the others than these reach,
-# this many times (LAS 2.0 has -999.25 in its header).
-_CODES = (-999.0, -999.25, -9999.0, -9999.25, -99999.0, -999999.0, 9999.0, 99999.0)
+# this many times (LAS 2.0 has -999.25 in its header, catman 1000000 for overflow).
+_CODES = (
+    *(-999.0, -999.25, -9999.0, -9999.25, -99999.0, -999999.0, 9999.0, 99999.0),
+    *(-1e6, 1e6),
+)
 _FAR = 1.0
 
 
@@ -104,7 +108,11 @@ def bridge_column(
 
 def _says_none(values: np.ndarray) -> np.ndarray:
     size = np.abs(values)
-    return ((size >= _NO_NUMBER) & (size < _NO_MORE)) | _are_codes(values)
+    is_none = (size >= _NO_NUMBER) & np.isfinite(values)
+    others = size[~is_none & np.isfinite(values)]
+    if others.size < is_none.sum() or others.max(initial=0.0) > _LARGEST_NUMBER:
+        is_none[:] = False
+    return is_none | _are_codes(np.where(is_none, np.nan, values))
 
 
 def _are_codes(values: np.ndarray) -> np.ndarray:
@@ -132,6 +140,11 @@ def _bridged(column: MeasuredColumn) -> np.ndarray:
 
 def _longest(column: MeasuredColumn, run: np.ndarray) -> int:
     """How many samples in a row may be bridged where some are missing."""
-    texts = [column.texts.get(int(column.rows[one]), "") for one in run]
-    is_over = any(text.lower() in OVER_RANGE_WORDS for text in texts)
+    is_over = any(is_over_range(column, int(one)) for one in run)
     return 1 if is_over else _LONGEST_BRIDGE
+
+
+def is_over_range(column: MeasuredColumn, index: int) -> bool:
+    """Whether a word says that a signal was out of range at a sample."""
+    text = column.texts.get(int(column.rows[index]), "")
+    return text.lower() in OVER_RANGE_WORDS

@@ -15,6 +15,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from hwid_cli.data.columns import FileColumns, keep_rows, with_each
+from hwid_cli.data.packed import stem_of
 from hwid_cli.errors import ConfigError, MeasurementError
 from hwid_cli.files.messages import shown
 from hwid_cli.files.small_files import read_small_file
@@ -82,7 +83,7 @@ def find_files(experiment: Experiment, base: Path) -> dict[Path, str]:
         return {}
     if barren or not paths:
         raise MeasurementError(missing_files_message(experiment, base))
-    paths.sort(key=lambda path: (_natural(path.stem), str(path)))
+    paths.sort(key=lambda path: (_natural(stem_of(path)), str(path)))
     return {path: names[path] for path in paths}
 
 
@@ -161,7 +162,7 @@ def _is_excluded(path: Path, name: str, options: RecordingsOptions) -> bool:
     return any(
         fnmatchcase(called, pattern)
         for pattern in options.exclude
-        for called in (path.stem, path.name, name)
+        for called in (stem_of(path), path.name, name)
     )
 
 
@@ -178,14 +179,14 @@ def names_of_files(paths: Sequence[Path]) -> dict[Path, str]:
     >>> list(names_of_files(told).values())
     ['a_slow', 'b_slow', 'fast']
     """
-    counts = Counter(path.stem for path in paths)
+    counts = Counter(stem_of(path) for path in paths)
     is_one = len(counts) == 1
     found = {}
     for path in paths:
-        parts = [] if is_one else [path.stem]
-        if counts[path.stem] > 1 and path.parent.name:
+        parts = [] if is_one else [stem_of(path)]
+        if counts[stem_of(path)] > 1 and path.parent.name:
             parts.insert(0, _as_name(path.parent.name))
-        found[path] = "_".join(parts) or path.stem
+        found[path] = "_".join(parts) or stem_of(path)
     return found
 
 
@@ -359,7 +360,33 @@ def cut_part(columns: FileColumns, part: FilePart) -> FileColumns:
 
 def _is_named(pattern: str, path: Path, name: str) -> bool:
     """Whether a pattern is on a recording's name, or on its file's without the ending."""
-    return any(fnmatchcase(one, pattern) for one in (name or path.stem, path.stem))
+    return any(
+        fnmatchcase(one, pattern) for one in (name or stem_of(path), stem_of(path))
+    )
+
+
+def without_excluded(
+    parts: Sequence[FilePart], options: RecordingsOptions
+) -> list[FilePart]:
+    """Recordings of a file that no pattern of ``recordings.exclude`` leaves out by name.
+
+    Raises
+    ------
+    MeasurementError
+        If none is left.
+    """
+    kept = [
+        part
+        for part in parts
+        if not any(fnmatchcase(part.name, pattern) for pattern in options.exclude)
+    ]
+    if kept or not parts:
+        return kept
+    raise MeasurementError(
+        f"{parts[0].path}: recordings.exclude leaves none of its {len(parts)} "
+        "recordings; expected at least one; make its patterns narrower, or leave out "
+        "the file"
+    )
 
 
 def unmatched_kinds(
@@ -422,7 +449,7 @@ def kind_of(
         )
     if matching:
         return matching[0]
-    return plan.get(name or path.stem, plan.get(path.stem, _OTHER))
+    return plan.get(name or stem_of(path), plan.get(stem_of(path), _OTHER))
 
 
 def read_plan(folder: Path) -> dict[str, str]:

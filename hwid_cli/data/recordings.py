@@ -32,6 +32,7 @@ from hwid_cli.data.recording_files import (
     recordings_base,
     recordings_options,
     unmatched_kinds,
+    without_excluded,
 )
 from hwid_cli.data.sampling import missing_samples, sample_uniformly
 from hwid_cli.data.signal_units import (
@@ -114,15 +115,15 @@ def _by_path(
     found: dict[Path, list[FilePart]] = {path: [] for path in names}
     for part in parts_of_files(names, options):
         found[part.path].append(part)
-    if "*" not in (options.columns.variable or ""):
-        return found
-    is_only = len(names) == 1
-    return {
-        path: parts_of_tables(
-            parts, tables_of(path, options.columns), is_only_file=is_only
-        )
-        for path, parts in found.items()
-    }
+    if "*" in (options.columns.variable or ""):
+        is_only = len(names) == 1
+        found = {
+            path: parts_of_tables(
+                parts, tables_of(path, options.columns), is_only_file=is_only
+            )
+            for path, parts in found.items()
+        }
+    return {path: without_excluded(parts, options) for path, parts in found.items()}
 
 
 def _read_tables(

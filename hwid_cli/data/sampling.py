@@ -14,7 +14,13 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from hwid_cli.data.column_signs import MOST_ODD, MOST_REPEATED, growing_rows
+from hwid_cli.data.column_signs import (
+    LONGEST_GAP,
+    MOST_ODD,
+    MOST_REPEATED,
+    are_pauses,
+    growing_rows,
+)
 from hwid_cli.data.columns import (
     FileColumns,
     MeasuredColumn,
@@ -48,9 +54,6 @@ _FEWEST_OF_CURVE = 8
 _NEXT_TO_IT = 0.05
 # Clocks that differ by less than this share of their step are one, [-].
 _SAME_CLOCK = 0.01
-# Longest stretch without a sample that a straight line may cross, [steps], or where that
-# is longer this share of a recording, [-].
-_LONGEST_GAP, _LONGEST_PAUSE = 10.0, 0.01
 _SIGNALS = ("input", "output", "reference")
 _FEWEST_SAMPLES = 20
 # Two time stamps make one step; one makes none.
@@ -90,9 +93,10 @@ def sample_uniformly(
         return columns, options.sample_time_s
     columns = _without_second_clock(columns)
     _check_length(path, columns, time)
-    columns, time = _without_repeated_rows(path, columns, time)
+    columns = _without_repeated_rows(path, columns)
     if options.resample:
-        columns, time = _without_odd_stamps(path, columns, time)
+        columns = _without_odd_stamps(path, columns)
+    time = columns.time or time
     steps = np.diff(time.values)
     _check_order(path, time, steps)
     median = float(np.median(steps))
@@ -198,68 +202,68 @@ def _without_second_clock(columns: FileColumns) -> FileColumns:
     return replace(columns, output_time=None) if far <= _SAME_CLOCK * step else columns
 
 
-def _without_repeated_rows(
-    path: Path, columns: FileColumns, time: MeasuredColumn
-) -> tuple[FileColumns, MeasuredColumn]:
+def _without_repeated_rows(path: Path, columns: FileColumns) -> FileColumns:
     """Leave out rows that a logger wrote twice, to the last digit."""
-    known = _of_one_length(columns)
-    if not known:
-        return columns, time
-    again = np.logical_and.reduce(
-        [
-            (one.values[1:] == one.values[:-1])
-            | (np.isnan(one.values[1:]) & np.isnan(one.values[:-1]))
-            for one in known.values()
-        ]
-    )
-    # More of them are no slip of a logger, but a clock that is too coarse.
-    if not 0.0 < np.mean(again) <= MOST_REPEATED:
-        return columns, time
-    _log.warning(
-        "%s: %d rows are the row before once more, and left out", path, again.sum()
-    )
-    return _kept_rows(columns, known, np.append(True, ~again))
+    for group in _of_each_clock(columns):
+        again = np.logical_and.reduce(
+            [
+                (one.values[1:] == one.values[:-1])
+                | (np.isnan(one.values[1:]) & np.isnan(one.values[:-1]))
+                for one in group.values()
+            ]
+        )
+        # More of them are no slip of a logger, but a clock that is too coarse.
+        if not 0.0 < np.mean(again) <= MOST_REPEATED:
+            continue
+        _log.warning(
+            "%s: %d rows are the row before once more, and left out", path, again.sum()
+        )
+        columns = _kept_rows(columns, group, np.append(True, ~again))
+    return columns
 
 
-def _without_odd_stamps(
-    path: Path, columns: FileColumns, time: MeasuredColumn
-) -> tuple[FileColumns, MeasuredColumn]:
+def _without_odd_stamps(path: Path, columns: FileColumns) -> FileColumns:
     """Leave out a few rows whose time does not go on from the rows around them."""
-    known = _of_one_length(columns)
-    if not known or not np.isfinite(time.values).all():
-        return columns, time
-    fits = growing_rows(time.values)
-    if not 0.0 < np.mean(~fits) <= MOST_ODD:
-        return columns, time
-    _log.warning(
-        "%s: %d rows are left out whose time does not go on (the first: row %d)",
-        path,
-        np.count_nonzero(~fits),
-        int(time.rows[np.argmin(fits)]),
-    )
-    return _kept_rows(columns, known, fits)
+    for group in _of_each_clock(columns):
+        time = next(iter(group.values()))
+        if not np.isfinite(time.values).all():
+            continue
+        fits = growing_rows(time.values)
+        if not 0.0 < np.mean(~fits) <= MOST_ODD:
+            continue
+        _log.warning(
+            "%s: %d rows are left out whose time does not go on (the first: row %d)",
+            path,
+            np.count_nonzero(~fits),
+            int(time.rows[np.argmin(fits)]),
+        )
+        columns = _kept_rows(columns, group, fits)
+    return columns
 
 
-def _of_one_length(columns: FileColumns) -> dict[str, MeasuredColumn]:
-    """Columns by role where they stand in the same rows; none where they do not."""
-    known = {
-        role: one
-        for role in ("time", *_SIGNALS)
-        if (one := getattr(columns, role)) is not None
-    }
-    is_one = len({one.values.size for one in known.values()}) == 1
-    return known if is_one and columns.output_time is None else {}
+def _of_each_clock(columns: FileColumns) -> list[dict[str, MeasuredColumn]]:
+    """Each clock, and the signals beside it, where they stand in the same rows."""
+    roles: list[tuple[str, ...]] = [("time", *_SIGNALS)]
+    if columns.output_time is not None:
+        roles = [("time", "input", "reference"), ("output_time", "output")]
+    groups = [
+        {role: one for role in of if (one := getattr(columns, role)) is not None}
+        for of in roles
+    ]
+    return [
+        one for one in groups if len({each.values.size for each in one.values()}) == 1
+    ]
 
 
 def _kept_rows(
-    columns: FileColumns, known: Mapping[str, MeasuredColumn], keep: np.ndarray
-) -> tuple[FileColumns, MeasuredColumn]:
-    """Some of the rows, and the time in them."""
+    columns: FileColumns, group: Mapping[str, MeasuredColumn], keep: np.ndarray
+) -> FileColumns:
+    """Some of the rows of the columns of a clock."""
     kept = {
         role: replace(one, values=one.values[keep], rows=one.rows[keep])
-        for role, one in known.items()
+        for role, one in group.items()
     }
-    return replace(columns, **kept), kept["time"]
+    return replace(columns, **kept)
 
 
 def _lacks_samples(columns: FileColumns) -> bool:
@@ -338,7 +342,7 @@ def _check_own_gaps(
     """Refuse to draw a line over a long stretch without samples."""
     gaps = np.diff(known)
     index = int(np.argmax(gaps))
-    if gaps[index] > _LONGEST_GAP * step:
+    if gaps[index] > LONGEST_GAP * step:
         raise MeasurementError(
             f"{path}: {column.title} has no sample from {known[index]:.9g} s to "
             f"{known[index + 1]:.9g} s; expected one every {step:.6g} s or so; cut the "
@@ -440,12 +444,13 @@ def _check_gaps(
 ) -> None:
     """Refuse to make up most of a recording, or what happened in a pause."""
     index = int(np.argmax(steps))
-    most = max(_LONGEST_GAP * step, _LONGEST_PAUSE * float(steps.sum()))
-    if steps.sum() / step > _MOST_GROWTH * time.values.size or steps[index] > most:
+    is_paused = are_pauses(steps, step).any()
+    if steps.sum() / step > _MOST_GROWTH * time.values.size or is_paused:
         raise MeasurementError(
             f"{place_of(path, time, index + 1)}: time jumps by {steps[index]:.6g} s, "
             f"from {time.values[index]:.9g} s to {time.values[index + 1]:.9g} s; "
-            f"expected steps near {step:.6g} s; cut the file at the gap"
+            f"expected steps near {step:.6g} s; cut the file at the gap, or make "
+            "both ends recordings of their own (recordings.parts)"
         )
 
 

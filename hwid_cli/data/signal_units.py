@@ -28,6 +28,7 @@ from hwid_cli.data.units import (
 )
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.experiment import (
+    AS_FILE,
     Experiment,
     FileUnits,
     RecordingsOptions,
@@ -77,7 +78,7 @@ def _in_seconds(
     path: Path, time: MeasuredColumn, stated: str | None
 ) -> tuple[MeasuredColumn, SignalUnit]:
     given, said_by = time.unit, time.unit_said_by
-    if stated is not None:
+    if stated not in (None, AS_FILE):
         given, said_by = stated, "recordings.units.time"
     elif not given or is_unitless(given):
         given = unit_of_dates(time.values)
@@ -120,9 +121,15 @@ def signal_unit(
     _refuse_other_quantity(column, role, experiment.source, options)
     label = getattr(options, f"{role}_unit")
     given, said_by = _given(column, role, options)
+    stated = getattr(options.units, role)
+    if stated == AS_FILE and not given:
+        raise MeasurementError(
+            f"{experiment.source}: recordings.units.{role}: found {AS_FILE!r}, but a file "
+            f"says no unit of its {column.title}; expected one in every file; name the "
+            "unit here if it is the same in all of them, or leave out that file"
+        )
     if given and is_unitless(given):
         return SignalUnit(role, given, said_by, label or given)
-    stated = getattr(options.units, role)
     if simulation is None and stated is None:
         return SignalUnit(role, given, said_by, label or given or _USUAL[role])
     target = label
@@ -167,6 +174,8 @@ def _given(
 ) -> tuple[str, str]:
     """Unit of a column's numbers, times their scale, and who says so."""
     stated = getattr(options.units, role)
+    if stated == AS_FILE:
+        return column.unit, column.unit_said_by
     if stated is not None:
         return stated, f"recordings.units.{role}"
     label = getattr(options, f"{role}_unit")

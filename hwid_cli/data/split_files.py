@@ -9,7 +9,7 @@ marked.
 import glob
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, takewhile
 from pathlib import PurePosixPath
@@ -61,19 +61,24 @@ class SplitRecordings:
         )
         return replace(
             layout,
-            patterns=self._patterns,
+            patterns=self._patterns({name for name, _ in layout.left}),
             output=self._own(layout.output),
             output_time=None if clock is None else self._own(clock),
             output_file=self.change,
             notes=(note, *layout.notes),
         )
 
-    @property
-    def _patterns(self) -> tuple[str, ...]:
-        """One pattern where the first files have an ending of their own, else their names."""
-        names = [one.name for one in self.files]
+    def _patterns(self, left: Collection[str]) -> tuple[str, ...]:
+        """One pattern where the first files have an ending of their own, else their names.
+
+        Parameters
+        ----------
+        left : collection of str
+            Files that are not used: no pattern finds the others alone.
+        """
+        names = [one.name for one in self.files if one.name not in left]
         ends = {name.rpartition(self.change[0])[2] for name in names}
-        if len(ends) == 1 and not set(self.change[0]) & set("[]*?"):
+        if not left and len(ends) == 1 and not set(self.change[0]) & set("[]*?"):
             below = "**/" if any("/" in name for name in names) else ""
             return (f"{below}*{self.change[0]}{ends.pop()}",)
         return tuple(glob.escape(name) for name in names)

@@ -118,7 +118,7 @@ class ColumnParts:
         self._rows.clear()
         is_text_below = self._count - self._last_value <= _MOST_TEXT_BELOW
         last = self._last_value if is_text_below and self._last_value else self._count
-        last = self._above_footer(rows, last)
+        last = min(self._above_footer(rows, last), self._below_clock(last))
         found = {}
         for place in self.places:
             values = np.concatenate([np.zeros(0), *self._blocks.pop(place)])
@@ -143,6 +143,16 @@ class ColumnParts:
         while first > 0 and is_word(texts.get(int(rows[first - 1]), "")):
             first -= 1
         return first if last - first <= _MOST_TEXT_BELOW else last
+
+    def _below_clock(self, last: int) -> int:
+        """Leave out a few last rows without a time of day, where the others have one."""
+        ends = [
+            int(np.flatnonzero(known)[-1]) + 1
+            for place in self.stamped
+            if (known := np.isfinite(np.concatenate(self._blocks[place]))).any()
+        ]
+        end = max(ends, default=last)
+        return end if last - end <= _MOST_TEXT_BELOW else last
 
     def _numbers(
         self, place: int, cells: Sequence[str | float], lines: np.ndarray

@@ -86,9 +86,16 @@ class Columns:
     ] = None
 
 
+# In place of a unit: what each file says, where one is in V and the next one in mV.
+AS_FILE = "file"
+
+
 @dataclass(frozen=True)
 class FileUnits:
-    """Units of a file's columns, where they are not those of the configuration."""
+    """Units of a file's columns, where they are not those of the configuration.
+
+    ``AS_FILE`` stands for the one that each file says.
+    """
 
     time: str | None = None
     input: str | None = None

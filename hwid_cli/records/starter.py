@@ -100,6 +100,8 @@ class FolderLayout:
         Rows at the beginning of the files in which a signal has no number.
     parts : dict of str to tuple of int, [samples]
         First and end of each recording where a file holds several; empty for one.
+    mixed : tuple of str
+        Roles whose unit is another one in some files.
     output_file : tuple of two str or None
         Where the output is in a file of its own: what the name of the input's file has,
         and that of the output's file in its place.
@@ -120,6 +122,7 @@ class FolderLayout:
     first_sample: int = 0
     parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
     output_file: tuple[str, str] | None = None
+    mixed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

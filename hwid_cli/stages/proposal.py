@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hwid_cli.data import column_signs as signs
-from hwid_cli.data.doubtful import doubts
+from hwid_cli.data.doubtful import copies, doubts
 from hwid_cli.data.signal_features import LEAST_QUIET, find_onset
 from hwid_cli.errors import HwidError
 from hwid_cli.records.experiment import CalibrateOptions
@@ -80,6 +80,8 @@ def propose(
     raws: Sequence[RawRecording],
     excluded: Sequence[str] = (),
     problems: Sequence[str] = (),
+    *,
+    may_cut: bool = True,
 ) -> Proposal:
     """Propose what to do with recordings.
 
@@ -91,22 +93,25 @@ def propose(
         Names of files that cannot be used.
     problems : sequence of str
         Why so.
+    may_cut : bool
+        Whether an only recording is cut in two, where its file is read as a whole.
     """
+    doubled = copies(raws)
+    raws = [raw for raw in raws if raw.name not in doubled]
+    excluded = (*excluded, *doubled)
+    said = (f"{one}: holds the same numbers as {of}" for one, of in doubled.items())
+    problems = (*problems, *said)
     kinds, kind_reason = _kinds(raws)
     recipes, recipe_reason = _recipes(raws, kinds)
     names = [raw.name for raw in raws]
-    parts = _parts(raws)
+    parts = _parts(raws) if may_cut else {}
     held_out, held_out_reason = _held_out(raws, kinds)
     if parts:
         held_out, held_out_reason = ("last",), "the end of the only recording"
     identify = ("first",) if parts else tuple(n for n in names if n not in held_out)
     is_large = len(identify) * 12 > _MOST_FITS
-    swing = float(
-        np.median([np.ptp(raw.output[np.isfinite(raw.output)]) for raw in raws])
-    )
     memory = int(np.median([signs.memory_samples(raw.output) for raw in raws]))
-    threshold = float(f"{_GOOD_SHARE * swing:.1g}")
-    unit = behind(raws[0].output_unit)
+    threshold, threshold_reason = _threshold(raws)
     return Proposal(
         kinds=_patterns(kinds, names),
         kind_reason=kind_reason,
@@ -120,7 +125,7 @@ def propose(
             else "enough for a drive with a spring; raise them after a look"
         ),
         threshold=threshold,
-        threshold_reason=_threshold_reason(threshold, swing, unit),
+        threshold_reason=threshold_reason,
         sample_time_s=raws[0].sample_time_s,
         reached=_reached(raws),
         exclude=tuple(glob.escape(name) for name in excluded),
@@ -143,12 +148,16 @@ def propose(
 _NUMBER = re.compile(r"[\W_]*\d+$|[\W_]+[A-Za-z]$")
 
 
-def _threshold_reason(threshold: float, swing: float, unit: str) -> str:
-    """What a threshold is of the swing, rounded as it is."""
+def _threshold(raws: Sequence[RawRecording]) -> tuple[float, str]:
+    """What a model may miss, and what that is of the usual swing, rounded as it is."""
+    swings = [np.ptp(raw.output[np.isfinite(raw.output)]) for raw in raws]
+    swing = float(np.median(swings))
+    threshold = float(f"{_GOOD_SHARE * swing:.1g}")
     if not swing > 0.0:
-        return "the output does not move"
-    share = 100.0 * threshold / swing
-    return f"about {share:.2g} % of the usual swing of the output, {swing:.3g}{unit}"
+        return threshold, "the output does not move"
+    share, unit = 100.0 * threshold / swing, behind(raws[0].output_unit)
+    said = f"about {share:.2g} % of the usual swing of the output, {swing:.3g}{unit}"
+    return threshold, said
 
 
 def kind_named(name: str) -> str:

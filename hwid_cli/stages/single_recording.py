@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hwid_cli.config.load import experiment_of
+from hwid_cli.data.packed import stem_of
 from hwid_cli.data.recordings import read_recordings
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.experiment import Columns
@@ -87,7 +88,7 @@ def load_recording(
     }
     (raw,) = read_recordings(experiment_of(content, _SOURCE), Path())
     return Recording(
-        name=path.stem,
+        name=stem_of(path),
         input=raw.input,
         output=raw.output,
         sample_time_s=raw.sample_time_s,

@@ -694,8 +694,8 @@ LAYOUTS = {
     "parquet": Layout(parquet, "when", "cmd_current [A]", "act_pos [mm]", _SI),
     "feather": Layout(feather, "time", "motor_current", "deflection", _SI),
     "simulink": Layout(
-        *(simulink, "ScopeData.time", "ScopeData.signals(1).values"),
-        "ScopeData.signals(2).values",
+        *(simulink, "ScopeData.time", "ScopeData.signals.u_cmd"),
+        "ScopeData.signals.y_act",
         (None, None, None),
     ),
     "simulink table": Layout(

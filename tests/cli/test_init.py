@@ -454,9 +454,10 @@ def test_every_file_is_named_with_what_became_of_it(folder, tmp_path):
 
 
 def test_files_in_other_units_are_not_read_in_the_first_ones(folder, tmp_path):
-    for name, unit, scale in (("a", "A", 1), ("b", "A", 1), ("c", "mA", 1000)):
+    units = (("a", "A", 1), ("b", "A", 1), ("c", "mA", 1000), ("d", "V", 1))
+    for name, unit, scale in units:
         time, u, y = measurements()["Rauschen_1"]
-        y = y + 1e-3 * (name == "b")
+        y = y + 1e-3 * "abcd".index(name)
         rows = [f"{t:.4f},{scale * a},{b}" for t, a, b in zip(time, u, y, strict=True)]
         head = ["t,current,pos", f"s,{unit},mm"]
         (folder / f"{name}.csv").write_text("\n".join([*head, *rows]))
@@ -464,8 +465,11 @@ def test_files_in_other_units_are_not_read_in_the_first_ones(folder, tmp_path):
     result = invoke("init", folder, "--out", out)
 
     assert result.exit_code == 0, result.output
-    assert "skipped: c.csv: its input is in 'mA', not in 'A'" in result.stdout
-    assert len(load_experiment(out).recordings.files) == 2
+    assert "skipped: d.csv: its input is in 'V', not in 'A'" in result.stdout
+    assert len(load_experiment(out).recordings.files) == 3
+    raws = read_recordings(load_experiment(out), tmp_path)
+    np.testing.assert_allclose(raws[2].input, raws[0].input, rtol=1e-12)
+    assert {one.input_unit for one in raws} == {"A"}
 
 
 @pytest.mark.thorough
@@ -590,6 +594,6 @@ def test_a_copy_of_a_recording_is_named_and_left_out(folder, tmp_path):
     result = invoke("init", folder, "--out", tmp_path / "mine.yaml")
 
     assert result.exit_code == 0, result.output
-    assert f"{copy.name}: holds the same numbers as {first.name}" in result.stdout
+    assert f"{copy.stem}: holds the same numbers as {first.stem}" in result.stdout
     raws = read_recordings(load_experiment(tmp_path / "mine.yaml"), tmp_path)
     assert copy.stem not in {one.name for one in raws}

@@ -6,6 +6,7 @@ than the package's: a turning mass on a spring, half-implicit steps.
 """
 
 import datetime as dt
+import gzip
 from dataclasses import dataclass
 
 import numpy as np
@@ -797,3 +798,120 @@ def labview_with_channels_that_begin_apart(folder):
         _put(folder / f"{name}.lvm", head + rows, end="\r\n")
         written.append(Written(u[late:], 1e-3 * y[late:], "V", "m"))
     return written
+
+
+@layout
+def text_packed_by_gzip(folder):
+    for name, run in zip(NAMES, RUNS, strict=True):
+        text = "\n".join([HEAD, *_rows(run)]) + "\n"
+        (folder / f"{name}.csv.gz").write_bytes(gzip.compress(text.encode()))
+    return _expected()
+
+
+@layout
+def a_spreadsheet_of_a_date_a_clock_and_means_below(folder):
+    """Thousands have points; the date makes the first column one of words."""
+
+    def german(value):
+        return f"{value:,.9f}".translate(str.maketrans(",.", ".,"))
+
+    clock = _stamp("%H:%M:%S", ",")
+    for name, run in zip(NAMES, RUNS, strict=True):
+        rows = [
+            f"01.05.2024;{clock(t)};{german(u)};{german(1e3 * y)};"
+            for t, u, y in zip(*run, strict=True)
+        ]
+        head = ["Prüfstand 3;;;;", "Datum;Uhrzeit;Strom [A];Weg [µm];Bemerkung"]
+        foot = [";;;;", "Mittelwert;;0,1;-2,5;", "Maximum;;3,1;9.123,4;"]
+        _put(folder / f"{name}.csv", [*head, *rows, *foot], "cp1252")
+    return [
+        Written(np.round(u, 9), 1e-6 * np.round(1e3 * y, 9), "A", "m")
+        for _, u, y in RUNS
+    ]
+
+
+@layout
+def an_oscilloscope_that_chooses_units_for_each_file(folder):
+    units = (("s", "mm", 1.0, 1.0), ("ms", "um", 1e3, 1e3), ("s", "m", 1.0, 1e-3))
+    for name, run, (of_time, unit, in_time, times) in zip(
+        NAMES, RUNS, units, strict=True
+    ):
+        t, u, y = run
+        head = ["Time,Channel A,Channel B", f"({of_time}),(A),({unit})", ""]
+        _put(folder / f"{name}.csv", [*head, *_rows((in_time * t, u, times * y))])
+    return _expected()
+
+
+@layout
+def runs_of_a_controller_below_one_another_with_events_and_torn_records(folder):
+    lines, begin = ['{"ev": "boot", "u": "pwm", "y": "adc 12 bit", "vbat": 12.1}'], 3.0
+    for number, (t, u, y) in enumerate(RUNS):
+        lines += [f'{{"ev": "start", "run": {number}, "t": {begin}}}']
+        lines += [
+            f'{{"t": {begin + a:.6f}, "u": {float(b)!r}, "y": {float(c)!r}, "tmp": 31}}'
+            for a, b, c in zip(t, u, y, strict=True)
+        ]
+        lines += ['{"ev": "stop", "n', '{"ev": "stop"}']
+        # The counter of the third run begins anew, as one of 32 bits does.
+        begin = 9.0 if number == 0 else 0.5
+    _put(folder / "all.jsonl", lines)
+    return _plain()
+
+
+@layout
+def signals_of_controldesk_in_another_order(folder):
+    import scipy.io
+
+    for number, (name, (t, u, y)) in enumerate(zip(NAMES, RUNS, strict=True)):
+        fields = [("Name", object), ("Data", object), ("Unit", object)]
+        order = [
+            ("i_soll [A]", u, "A"),
+            ("x_ist [mm]", y, "mm"),
+            ("load", 1e-4 * (1 + np.sin(40 * t)), "s"),
+        ]
+        signals = np.zeros((1, 3), dtype=fields)
+        for place, (title, values, unit) in enumerate(order[:: -1 if number else 1]):
+            signals[0, place] = (title, values[None, :], unit)
+        time = {"Name": "Raster", "Data": t[None, :], "Unit": "s"}
+        scipy.io.savemat(folder / f"{name}.mat", {name: {"X": time, "Y": signals}})
+    return _expected()
+
+
+@layout
+def sheets_with_a_hidden_copy_and_one_that_is_too_short(folder):
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.active.title = "Deckblatt"
+    sheets = [*zip(NAMES, RUNS, strict=True), ("run_b_alt", RUNS[1])]
+    sheets += [("Nullpunkt", [one[:25] for one in RUNS[2]])]
+    for name, run in sheets:
+        sheet = book.create_sheet(name)
+        sheet.append(HEAD.split(","))
+        for cells in zip(*run, strict=True):
+            sheet.append([float(one) for one in cells])
+    book["run_b_alt"].sheet_state = "hidden"
+    book.save(folder / "all.xlsx")
+    return _expected()
+
+
+@layout
+def channels_in_files_of_their_own_saved_twice(folder):
+    for number, (t, u, y) in enumerate((*RUNS, RUNS[1])):
+        (folder / f"ALL000{number}").mkdir()
+        for channel, values in (("CH1", u), ("CH2", y)):
+            rows = _rows((t, values))
+            path = folder / f"ALL000{number}" / f"F000{number}{channel}.CSV"
+            _put(path, ["Time [s],Voltage [V]", *rows])
+    return _expected("V", "V", scale=1.0)
+
+
+@layout
+def a_commanded_pressure_the_one_that_it_made_and_a_stroke(folder):
+    def rows(run):
+        t, u, y = run
+        made = np.convolve(u, np.full(12, 1 / 12))[:N]
+        return _rows((t, u + 4.0, made + 4.0, y))
+
+    _texts(folder, ["Zeit [s],Solldruck [bar],Istdruck [bar],Verkürzung [mm]"], rows)
+    return [Written(u + 4.0, 1e-3 * y, "bar", "m") for _, u, y in RUNS]

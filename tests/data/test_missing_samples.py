@@ -81,7 +81,13 @@ def test_only_one_sample_out_of_range_is_bridged():
 
 @pytest.mark.parametrize(
     ("usual", "code", "is_none"),
-    [(2800.0, -9999.0, True), (2800.0, 9999.0, True), (6000.0, -9999.0, False)],
+    [
+        *((2800.0, -9999.0, True), (2800.0, 9999.0, True), (6000.0, -9999.0, False)),
+        # catman's word for overflow, and a logger's for a wire that is broken.
+        *((120.0, 1e6, True), (7e5, 1e6, False), (22.0, 7.77777e99, True)),
+        # All others are as large: a unit that nobody expects.
+        (5e37, 9.9e37, False),
+    ],
 )
 def test_a_number_far_from_all_others_is_a_loggers_word_for_none(usual, code, is_none):
     output = usual * np.sin(np.arange(500) / 40.0)

@@ -50,6 +50,15 @@ def test_parts_of_several_files_carry_the_name_of_their_file(tiny, save):
     assert names == ["a_x", "a_y", "b_x", "b_y"]
 
 
+def test_a_part_is_left_out_by_its_name(tiny, save):
+    save()
+    parts = "parts: {rise: [0, 80], fall: [100, 200], rest: [80, 100]}"
+    kept = read(tiny(more=f"exclude: [ris*, rest]\n{parts}"))
+    assert [one.name for one in kept] == ["fall"]
+    with pytest.raises(MeasurementError, match=r"leaves none of its 3 recordings"):
+        read(tiny(more=f"exclude: [ris*, rest, fall]\n{parts}"))
+
+
 def test_kind_of_a_part_comes_from_its_own_name_or_that_of_its_file(tiny, save):
     save("step_1.csv")
     save("other.csv")

@@ -144,7 +144,7 @@ def test_a_sensor_that_stops_at_full_speed_is_named_where_others_move(spoilt):
     assert list(found) == ["r2"]
     assert found["r2"][0].startswith("the output stops at full speed")
     # Where most do so, or too few tell what is usual, it is meant.
-    assert not doubts(recordings(MOVING, spoilt, spoilt))
+    assert not doubts(recordings(MOVING, spoilt, 2.0 * spoilt))
     assert not doubts(recordings(MOVING, spoilt))
 
 

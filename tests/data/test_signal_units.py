@@ -360,6 +360,26 @@ def test_files_in_different_units_are_no_experiment_unless_converted(tiny, tmp_p
     np.testing.assert_allclose(first.output, 1e-3 * second.output, rtol=1e-15)
 
 
+def test_each_file_may_say_its_own_unit(tiny, write_csv, signals):
+    """An oscilloscope chooses mV or V by the range of a channel, and ms or s."""
+    t, u, y = signals
+    names = "t,u,y"
+    write_csv("a.csv", columns=(t, u, y), header=f"{names}\ns,V,V")
+    write_csv("b.csv", columns=(1e3 * t, u, 1e3 * y), header=f"{names}\nms,V,mV")
+    mixed = "units: {time: file, output: file}"
+    one, other = read(tiny(more=mixed))
+
+    np.testing.assert_allclose(other.output, one.output, rtol=1e-15)
+    assert (one.output_unit, other.output_unit) == ("V", "V")
+    assert one.sample_time_s == other.sample_time_s == 0.01
+    assert units_of(other)["output"] == ("mV", "V", 1e-3)
+    with pytest.raises(MeasurementError, match=r"b.csv: has its output in 'mV'; expec"):
+        read(tiny())
+    write_csv("a.csv", columns=signals, header=names)
+    with pytest.raises(MeasurementError, match=r"units.output: found 'file', but a fi"):
+        read(tiny(more=mixed))
+
+
 def test_exported_scales_take_a_file_to_the_units_of_the_recording(
     tiny, write_csv, signals
 ):

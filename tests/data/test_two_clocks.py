@@ -42,6 +42,18 @@ def test_two_clocks_become_that_of_the_slower_signal_over_their_common_time(t, t
     assert found.output.unit == "mm"
 
 
+def test_a_message_that_was_written_twice_is_left_out_of_its_own_signal(caplog):
+    again = np.insert(SLOW, 100, SLOW[100])
+    given = signals(FAST, again)
+    found, step = sample_uniformly("run.csv", given, options(resample=True))
+    once, _ = sample_uniformly("run.csv", signals(FAST, SLOW), options(resample=True))
+
+    assert step == 0.004
+    np.testing.assert_array_equal(found.output.values, once.output.values)
+    np.testing.assert_array_equal(found.input.values, once.input.values)
+    assert "1 rows are the row before once more" in caplog.text
+
+
 def test_a_fast_input_is_averaged_over_the_steps_of_the_slow_clock():
     """Else a carrier of the sampling rate would become a level."""
     carrier = signals(FAST, FAST[::4], u=lambda t: np.cos(np.pi * t / 0.001))

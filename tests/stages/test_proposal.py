@@ -1,3 +1,4 @@
+import zlib
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,11 @@ from hwid_cli.stages.proposal import propose
 
 def raw(name, input_):
     output = np.convolve(input_, np.ones(8) / 8)[: input_.size]
-    return RawRecording(name, input_, output, 1e-3)
+    # No reading of a sensor comes twice.
+    noise = np.random.default_rng(zlib.crc32(name.encode())).standard_normal(
+        output.size
+    )
+    return RawRecording(name, input_, output + 1e-6 * noise, 1e-3)
 
 
 def levels(seed, size=600):
@@ -40,6 +45,16 @@ def test_of_repeats_of_an_input_the_last_one_is_for_the_test():
         for number in (1, 2, 3)
     ]
     assert held_out(*recordings) == (("a3", "b3"), "the last repeat of each input")
+
+
+def test_a_copy_is_neither_for_the_test_nor_for_the_fit():
+    one, other = raw("run_1", levels(1)), raw("run_2", levels(2))
+    found = propose(
+        [one, other, replace(other, name="run_2_old"), raw("run_3", levels(3))]
+    )
+    assert found.exclude == ("run_2_old",)
+    assert found.problems == ("run_2_old: holds the same numbers as run_2",)
+    assert found.names == ("run_1", "run_2", "run_3")
 
 
 def test_a_measured_input_is_never_the_same_and_its_repeats_are_known():
