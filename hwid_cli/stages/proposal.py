@@ -96,11 +96,8 @@ def propose(
     may_cut : bool
         Whether an only recording is cut in two, where its file is read as a whole.
     """
-    doubled = copies(raws)
-    raws = [raw for raw in raws if raw.name not in doubled]
-    excluded = (*excluded, *doubled)
-    said = (f"{one}: holds the same numbers as {of}" for one, of in doubled.items())
-    problems = (*problems, *said)
+    raws, doubled = _without_copies(raws)
+    problems = (*problems, *doubled.values())
     kinds, kind_reason = _kinds(raws)
     recipes, recipe_reason = _recipes(raws, kinds)
     names = [raw.name for raw in raws]
@@ -128,7 +125,7 @@ def propose(
         threshold_reason=threshold_reason,
         sample_time_s=raws[0].sample_time_s,
         reached=_reached(raws),
-        exclude=tuple(glob.escape(name) for name in excluded),
+        exclude=tuple(glob.escape(name) for name in (*excluded, *doubled)),
         parts=parts,
         identify=identify if held_out else (),
         held_out=held_out,
@@ -146,6 +143,18 @@ def propose(
 
 # What numbers recordings: digits, or one letter behind a line.
 _NUMBER = re.compile(r"[\W_]*\d+$|[\W_]+[A-Za-z]$")
+
+
+def _without_copies(
+    raws: Sequence[RawRecording],
+) -> tuple[list[RawRecording], dict[str, str]]:
+    """Recordings of their own, and by name what to say of the copies among them."""
+    doubled = copies(raws)
+    said = {
+        one: f"{one}: holds the same numbers as {first}"
+        for one, first in doubled.items()
+    }
+    return [raw for raw in raws if raw.name not in doubled], said
 
 
 def _threshold(raws: Sequence[RawRecording]) -> tuple[float, str]:
