@@ -304,9 +304,13 @@ def find(
     searched = _held_or_not(problem, options, run_tasks, on_round, given_sse)
     if may_cut:
         searched = _with_pieces(searched, options.max_effects)
-    behind = _behind_noise_filter(searched, options)
-    if behind is not None:
-        return behind
+    filtered = _behind_noise_filter(searched, options)
+    if filtered is not None:
+        searched = _led_by(searched, filtered)
+        if not _is_settled(searched):
+            behind = _told_behind_filter(searched, filtered, options)
+            if behind is not None:
+                return behind
     whole = _judged(searched, options)
     if whole.pieces is not None or whole.law is not None:
         return whole
@@ -334,10 +338,10 @@ def _held_or_not(
 
 def _behind_noise_filter(
     searched: "_Searched", options: DiagnoseOptions
-) -> Findings | None:
-    """What a second look finds where noise of the input hides what is missing.
+) -> "_Searched | None":
+    """A second look, where noise of the input hides what is missing.
 
-    None where it is not needed, or settles nothing either.
+    None where it is not needed.
     """
     rounds, criteria = searched.rounds, searched.rounds.criteria
     if not searched.is_open or criteria.standing is not None or options.laws == "only":
@@ -352,16 +356,45 @@ def _behind_noise_filter(
         return None
     rounds.on_round("behind a filter for noise of the input", 0)
     run_tasks = FilteredTasks(rounds.run_tasks, problem)
-    again = _held_or_not(problem, options, run_tasks, rounds.on_round, None)
-    told = _judged(again, replace(options, laws="never"))
+    return _held_or_not(problem, options, run_tasks, rounds.on_round, None)
+
+
+def _led_by(searched: "_Searched", filtered: "_Searched") -> "_Searched":
+    """Whole recordings, with the sets that were found behind a filter fitted to them.
+
+    Errors that follow from earlier ones are hidden there, so that sets are found to which
+    no way leads from single effects.
+    """
+    rounds, drive = searched.rounds, filtered.rounds.problem.drive
+    seeds = [one for one in filtered.found.best if one.is_usable]
+    if not seeds or drive.hold != rounds.problem.drive.hold:
+        return searched
+    found = continue_rounds(rounds, searched.found, seeds, with_relatives=True)
+    return replace(searched, found=found)
+
+
+def _is_settled(searched: "_Searched") -> bool:
+    """Whether whole recordings say what is missing, and little is left."""
+    rounds = searched.rounds
+    verdict = decided(rounds, searched.given_sse, searched.found)
+    is_named = verdict.word in ("named", "ambiguous")
+    return is_named and rounds.criteria.ratio(verdict.chosen) <= STILL_LARGE
+
+
+def _told_behind_filter(
+    searched: "_Searched", filtered: "_Searched", options: DiagnoseOptions
+) -> Findings | None:
+    """What is found behind a filter for noise of the input; None if nothing is settled."""
+    noise = searched.rounds.baseline.noise
+    told = _judged(filtered, replace(options, laws="never"))
     left = told.criteria.ratio(told.verdict.chosen)
     if told.verdict.word == "unknown" or left > MOST_LEFT_BY_SET:
         return None
-    whole = again.rounds.problem.without_filter()
+    whole = filtered.rounds.problem.without_filter()
     if not holds_that_noise(whole, told.verdict.chosen, told.scales, noise):
         return None
     if told.pieces is None:
-        told = replace(told, other=other_command(again.rounds, told.verdict.chosen))
+        told = replace(told, other=other_command(filtered.rounds, told.verdict.chosen))
     return _with_both_errors(told, noise)
 
 

@@ -9,8 +9,9 @@ from hwid_cli.drive.catalogue import CATALOGUE, may_be_added, public_id
 from hwid_cli.drive.effect import Scales, Values
 
 Effects = tuple[str, ...]
-# Starts of one effect that a related one hands its values to.
-TRANSLATED_STARTS = 3
+# Starts of one effect that a related one hands its values to; of one that shares none with
+# it, which begins nowhere in particular, so many.
+TRANSLATED_STARTS, BLIND_STARTS = 3, 12
 
 
 def with_effect(effects: Effects, another: str) -> Effects:
@@ -122,8 +123,10 @@ def translated(effect: str, values: Values, scales: Scales) -> list[dict[str, fl
     if entry.beside:
         signed = {one.name for one in entry.parameters if not one.is_positive}
         given.append({k: -one if k in signed else one for k, one in values.items()})
+    is_blind = not any(one.name in values for one in entry.parameters)
+    count = BLIND_STARTS if is_blind else TRANSLATED_STARTS
     found = []
-    for start in entry.starts(scales)[:TRANSLATED_STARTS]:
+    for start in entry.starts(scales)[:count]:
         for one in given:
             same = {name: one.get(name, value) for name, value in start.items()}
             if same not in found:

@@ -23,7 +23,9 @@ from hwid_cli.diagnosis.effect_sets import (
     Effects,
     includes_one_of,
     is_nested,
+    may_stand,
     with_effect,
+    without_effect,
 )
 from hwid_cli.diagnosis.forecast import (
     Forecast,
@@ -75,6 +77,8 @@ class Proposals:
         for parent in parents:
             for ids, starts in self._on_top(parent, few).items():
                 found.setdefault(ids, []).extend(starts)
+            for ids, start in self._imitated_by(parent):
+                found.setdefault(ids, []).insert(0, start)
         if size == 2 and self._forecasts:
             for ids, start in self._likely_pairs():
                 found.setdefault(ids, []).append(start)
@@ -118,6 +122,23 @@ class Proposals:
             ]
             for one in found
         }
+
+    def _imitated_by(
+        self, parent: CandidateFit
+    ) -> Iterable[tuple[Effects, SearchStart]]:
+        """Sets with one effect more, in which two take the place of one of a set."""
+        present = drive_effects(self.rounds.problem.drive)
+        values = start_values(parent, present)
+        base = base_start(self.rounds.problem.drive, parent)
+        for effect in parent.effects:
+            imitated = CATALOGUE[effect].imitated if effect in CATALOGUE else None
+            others = without_effect(values, effect)
+            for own in () if imitated is None else imitated(values[effect]):
+                kept = (one for one in parent.effects if one != effect)
+                ids = tuple(sorted((*kept, *own)))
+                is_allowed = set(own) <= set(self.rounds.allowed)
+                if is_allowed and may_stand(ids, present):
+                    yield ids, SearchStart(base, {**others, **own})
 
     def _stated(
         self, parent: CandidateFit, present: dict[str, dict[str, float]]

@@ -124,7 +124,11 @@ def _needs_nothing_more(rounds: Rounds, winner: CandidateFit) -> bool:
 
 
 def continue_rounds(
-    rounds: Rounds, found: RoundsResult, seeds: Sequence[CandidateFit]
+    rounds: Rounds,
+    found: RoundsResult,
+    seeds: Sequence[CandidateFit],
+    *,
+    with_relatives: bool = False,
 ) -> RoundsResult:
     """Fit sets that another search has found, beside those of this one.
 
@@ -133,11 +137,15 @@ def continue_rounds(
     seeds : sequence of CandidateFit
         Sets with the values to start from, such as those that pieces of the recordings
         have led to.
+    with_relatives : bool
+        Whether relatives of the largest set begin where that has ended.
     """
     search = _Search(rounds)
     search.fits.found.update(found.fits)
     search.proposals.shares.update(found.shares)
     search.fit_seeds(seeds)
+    if with_relatives and seeds:
+        search.use_again(max(len(one.effects) for one in seeds))
     largest = max((len(one) for one in search.fits.found), default=0)
     best: list[CandidateFit] = []
     for size in range(1, largest + 1):
@@ -188,10 +196,10 @@ class _Search:
             todo = {ids: chosen[ids] for ids in chosen if ids in may_add}
             self.fits.finish(what, that_add(self.fits, todo) if depth else todo)
         self.fits.grow(size)
-        self._use_again(size)
+        self.use_again(size)
         self.fits.go_on(size)
         if self.fits.grow_bouncing(size):
-            self._use_again(size)
+            self.use_again(size)
         self.fits.fit_with_input_noise(size)
         return self.fits.best_of_size(size)
 
@@ -331,7 +339,12 @@ class _Search:
         for size in range(len(best), 1, -1):
             parts = without_each(self.fits, best[size - 1])
             self.fits.finish("without each effect", parts)
-            best[size - 2] = self.fits.best_of_size(size - 1) or best[size - 2]
+            found = self.fits.best_of_size(size - 1) or best[size - 2]
+            if found is not best[size - 2] and size > 2:
+                # No smaller set has led there: its relatives were never tried from there.
+                self.use_again(size - 1)
+                found = self.fits.best_of_size(size - 1) or found
+            best[size - 2] = found
 
     def fit_seeds(self, seeds: Sequence[CandidateFit]) -> None:
         """Fit sets from the values that another search has found."""
@@ -342,7 +355,7 @@ class _Search:
         for size in sorted({len(one.effects) for one in seeds}):
             self.fits.go_on(size)
 
-    def _use_again(self, size: int) -> None:
+    def use_again(self, size: int) -> None:
         """Start simpler effects where richer ones ended, and the other way round.
 
         Richer ones last, and not at all once nothing is left.

@@ -44,6 +44,10 @@ LEAST_LAST_CONTRIBUTION = 5e-4
 # of several effects, and of values that each recording has for itself, which imitate most.
 LEAST_EXPLAINED_FAR = 0.99
 LEAST_CONTRIBUTION_FAR = 0.05
+# Less where no other set of as many effects comes near it: of so many that were tried, each
+# leaves so many times as much.
+LEAST_EXPLAINED_ALONE = 0.95
+LEAST_OF_SIZE, ALONE = 10, 2.5
 # So has one effect that leaves this share of the motion: whatever turns with the error
 # explains a good part of one that large.
 LARGE_SHARE_OF_MOTION = 0.1
@@ -369,13 +373,35 @@ class SelectionCriteria:
         """
         return self.excess(found) < LEAST_CONTRIBUTION * self.excess(base)
 
-    def may_be_named(self, found: CandidateFit, base: CandidateFit) -> bool:
+    def is_alone(self, found: CandidateFit, tried: Sequence[CandidateFit]) -> bool:
+        """Whether a set leaves far less than all others of its size, of many.
+
+        Parameters
+        ----------
+        tried : sequence of CandidateFit
+            Of its size. Those that are it but for another law of one effect do not count.
+        """
+        others = [one for one in tried if one is not found and one.is_usable]
+        others = [one for one in others if not _is_it_but_for_a_law(one, found)]
+        most = ALONE * self.excess(found)
+        return len(others) >= LEAST_OF_SIZE and all(
+            self.excess(one) >= most for one in others
+        )
+
+    def may_be_named(
+        self,
+        found: CandidateFit,
+        base: CandidateFit,
+        tried: Sequence[CandidateFit] = (),
+    ) -> bool:
         """Whether the evidence for a set of effects suffices.
 
         Parameters
         ----------
         base : CandidateFit
             Re-fitted, without further effects.
+        tried : sequence of CandidateFit
+            Of the set's size.
 
         References
         ----------
@@ -390,6 +416,8 @@ class SelectionCriteria:
             # Held-out recordings that leave next to nothing are explained by chance.
             explained = min(explained, self._explained(found, base, self._sides[1]))
         explains = explained >= least
+        if not explains and explained >= LEAST_EXPLAINED_ALONE and self.is_far(found):
+            explains = self.is_alone(found, tried)
         return (
             against.gain >= LEAST_GAIN
             and (explains or self.leaves_noise(found))
@@ -547,6 +575,23 @@ def has_size(found: CandidateFit) -> bool:
     return not any(
         is_factor(one) and float(np.std(found.own[:, column])) < LEAST_SPREAD
         for column, one in enumerate(found.own_names)
+    )
+
+
+def _is_it_but_for_a_law(one: CandidateFit, other: CandidateFit) -> bool:
+    """Whether two sets differ in one effect, by one that it includes or is included in."""
+    more, less = (
+        set(one.effects) - set(other.effects),
+        set(other.effects) - set(one.effects),
+    )
+    if not len(more) == 1 == len(less):
+        return False
+    (two,), (three,) = more, less
+    is_one_kind = public_id(two) == public_id(three)
+    return (
+        is_one_kind
+        or three in CATALOGUE[two].contains
+        or two in CATALOGUE[three].contains
     )
 
 

@@ -36,6 +36,8 @@ from hwid_cli.records.diagnosis import SMALL_REMAINDER, STILL_LARGE
 
 # Share that each of several rivals explains of what none of them explains for the most.
 LEAST_OF_RIVALS = 0.35
+# Of the excess that single effects leave, what a set leaves that leaves them far behind.
+_FAR_LESS = 0.1
 # Sets that leave at most so many times what the best one leaves count as near it, so many
 # at least; what all near sets share is there, whatever the rest is.
 NEAR_BEST, LEAST_SHARING = 2.0, 10
@@ -129,8 +131,9 @@ def decide(
         return DiagnosisVerdict(word, criteria.is_complete(base), base, ())
 
     def may_be_named(one: CandidateFit) -> bool:
+        tried = [fit for fit in fits.values() if len(fit.effects) == len(one.effects)]
         return (
-            criteria.may_be_named(one, base)
+            criteria.may_be_named(one, base, tried)
             and needs_each(criteria, one, fits, base)
             and not _is_beaten_by_fewer(criteria, one, fits, base)
             and not unclear(one)
@@ -197,7 +200,7 @@ def _nameless(
             _without_effect(criteria, given_sse, base), False, base, ()
         )
     halves = _rivals_by_halves(criteria, base, fits, unclear)
-    if len(halves) > 1:
+    if len(halves) > 1 and not _is_left_behind(criteria, halves[0], fits):
         return DiagnosisVerdict("ambiguous", False, halves[0], tuple(halves[1:]))
     shared = _shared_by_best(criteria, base, fits, unclear)
     if shared is not None:
@@ -433,6 +436,25 @@ def _rivals_by_halves(
     if not found:
         return []
     return [found[0], *rivals(criteria, found, found[0])]
+
+
+def _is_left_behind(
+    criteria: SelectionCriteria,
+    half: CandidateFit,
+    fits: Mapping[tuple[str, ...], CandidateFit],
+) -> bool:
+    """Whether a set of several, be it none to name, leaves far less than a single effect.
+
+    Then the single one is at best a part of what is missing, and most likely an imitation.
+    """
+    most = _FAR_LESS * criteria.excess(half)
+    return any(
+        len(one.effects) > 1
+        and one.is_usable
+        and not has_own_values(one)
+        and criteria.excess(one) <= most
+        for one in fits.values()
+    )
 
 
 def _explains_a_part(

@@ -379,6 +379,8 @@ class Effect:
     seen : callable or None
         Values to start from that belong together, from the scales: what the recordings
         show, say. Where there are some they stand in for the parameters' own.
+    imitated : callable or None
+        Sets of several effects that one alone may stand for, from its values, with theirs.
     resonant : callable or None
         Values with which it resonates at a frequency [Hz], for an effect that does.
     stated : tuple of Stated
@@ -429,6 +431,7 @@ class Effect:
     needs_stand_in: bool = False
     needs_circuit: bool = False
     seen: Callable[[Scales], tuple[dict[str, float], ...]] | None = None
+    imitated: Callable[[Values], tuple[Mapping[str, Values], ...]] | None = None
     resonant: Callable[[float, Scales], tuple[dict[str, float], ...]] | None = None
     stated: tuple[Stated, ...] = ()
     is_rugged: bool = False

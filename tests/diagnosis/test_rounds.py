@@ -187,7 +187,7 @@ def test_richer_relatives_are_not_tried_once_a_plain_one_leaves_nothing(
         rounds, "from_related", lambda fits, size: {richer: [], plain: []}
     )
     monkeypatch.setattr(search, "_tried_again", tried_again)
-    search._use_again(1)
+    search.use_again(1)
     name = "single effects, from related ones"
     wide = () if completes else ((f"{name} that include others", 1, richer),)
     assert tried == [(name, 1, plain), *wide] * 2

@@ -1,5 +1,6 @@
 """Declarations of effects: what resists motion. docs/method_diagnosis.md, (D8), (D9)."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import pi
 
@@ -202,6 +203,39 @@ def _wave_periods(scales: Scales) -> tuple[float, ...]:
     return tuple(one for one in periods if one <= _wave_bounds(scales)[1])
 
 
+# Of the force against the motion that waves of the driving force are a share of.
+_OF_DRIVING = 0.6
+
+
+def _friction_beside_waves(values: Values) -> tuple[Mapping[str, Values], ...]:
+    """Plain friction beside waves of the driving force, or of a force along the way.
+
+    While the drive goes one way, all three are the same.
+    """
+    dry = {"force_N": values["force_N"]}
+    share, period = values["variation_share"], values["period_m"]
+    found: list[Mapping[str, Values]] = []
+    # It acts against the motion, the others along it; where it has to follow many waves,
+    # a period that is a little off has led its phase anywhere.
+    for turn in (pi, -0.5 * pi, 0.5 * pi, 0.0):
+        phase = values.get("phase_rad", 0.0) + turn
+        ripple = {
+            "share": _OF_DRIVING * share,
+            "per_turn": 2 * pi / period,
+            "phase_rad": phase,
+        }
+        waves = {
+            "amplitude_N": share * values["force_N"],
+            "period_m": period,
+            "phase_rad": phase,
+        }
+        found += [
+            {"coulomb_friction": dry, "torque_ripple": ripple},
+            {"coulomb_friction": dry, "cogging": waves},
+        ]
+    return tuple(found)
+
+
 POSITION = Effect(
     id="position_friction",
     sentence="dry friction that varies along the way",
@@ -236,6 +270,7 @@ POSITION = Effect(
         ),
     ),
     derived={"WAVY_FRICTION": _wave},
+    imitated=_friction_beside_waves,
     confused_with={
         "cogging": "the same slow way forward and backward",
         "coulomb_friction": "slow motion over the whole stroke",

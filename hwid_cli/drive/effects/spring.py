@@ -81,6 +81,7 @@ CUBIC = Effect(
         "end_stop": "small and full amplitude",
         "one_sided_stop": "small and full amplitude to both sides",
         "sensor_cubic": "a sine near resonance",
+        "gravity": "motion over a large angle",
     },
 )
 
@@ -104,6 +105,7 @@ QUADRATIC = Effect(
         "cubic_stiffness": "a step of the other sign",
         "one_sided_stop": "small and full amplitude to both sides",
         "sensor_quadratic": "a sine near resonance",
+        "gravity": "motion over a large angle",
     },
 )
 
