@@ -493,10 +493,12 @@ def _fitted_effects_of(
     each = zip(found.names, found.values, *ends, strict=True)
     for one, value, low, high in each:
         if one.owner in parameters:
+            # A search may have turned an angle several times.
+            turned = CATALOGUE[one.owner].parameter(one.parameter).nearest(float(value))
             parameters[one.owner].append(
                 FittedParameter(
-                    one.parameter, float(value), float(low), float(high),
-                    unit=_unit_of(one),
+                    one.parameter, float(value) + turned, float(low) + turned,
+                    float(high) + turned, unit=_unit_of(one),
                 )
             )  # fmt: skip
     for identifier in ids:

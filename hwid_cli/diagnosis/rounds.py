@@ -30,7 +30,7 @@ from hwid_cli.diagnosis.related_sets import (
     that_add,
     without_each,
 )
-from hwid_cli.diagnosis.selection import LEAST_ADDED, is_part_of
+from hwid_cli.diagnosis.selection import LEAST_ADDED, has_own_values, is_part_of
 from hwid_cli.diagnosis.set_fits import (
     FAR_BEHIND,
     LEAST_LEFT,
@@ -107,16 +107,27 @@ def run_rounds(
         if winner is None or not search.goes_on(winner, best):
             break
         best.append(winner)
-        if _needs_nothing_more(rounds, winner) or is_enough(search.result(best)):
+        wider = [one for one in search.fits.of_size(size) if is_part_of(winner, one)]
+        if _needs_nothing_more(rounds, winner, wider) or is_enough(search.result(best)):
             break
         parents = search.parents(size)
     search.fit_parts(best)
     return search.result(best)
 
 
-def _needs_nothing_more(rounds: Rounds, winner: CandidateFit) -> bool:
+def _needs_nothing_more(
+    rounds: Rounds, winner: CandidateFit, wider: Sequence[CandidateFit] = ()
+) -> bool:
+    """Whether no larger set could be named.
+
+    Parameters
+    ----------
+    wider : sequence of CandidateFit
+        Sets of as many effects that include the winner.
+    """
     criteria, base = rounds.criteria, rounds.base
-    if criteria.is_nearly_all(winner, base):
+    usable = [one for one in wider if one.is_usable and not has_own_values(one)]
+    if any(criteria.is_nearly_all(one, base) for one in (winner, *usable)):
         return True
     # A drive that stands for another simulation errs itself: its runs judge.
     stands_in = criteria.standing is not None

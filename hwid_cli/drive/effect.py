@@ -304,6 +304,8 @@ class Parameter:
         Of the value that a configuration states.
     unit : str
         Where the name does not say it.
+    turn : float, [unit of the parameter]
+        After which the effect is the same, as an angle after 2 pi; 0 for never.
     """
 
     name: str
@@ -319,6 +321,11 @@ class Parameter:
     default: float | None = None
     limits: tuple[Limit, ...] = ()
     unit: str = ""
+    turn: float = 0.0
+
+    def nearest(self, value: float) -> float:
+        """By how much a value is moved to be the nearest to 0 that means the same."""
+        return -self.turn * round(value / self.turn) if self.turn else 0.0
 
 
 @dataclass(frozen=True)

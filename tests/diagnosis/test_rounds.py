@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis import rounds
+from hwid_cli.diagnosis import diagnose, rounds
 from hwid_cli.diagnosis.candidate import Screened
 from hwid_cli.diagnosis.few_samples import first_parts
 from hwid_cli.diagnosis.forecast import Forecast
@@ -339,3 +339,73 @@ def test_beside_what_is_stated_a_limit_has_all_its_starts(effect, count, kept):
         effect, 0.5, tuple({"value": float(n)} for n in range(4)), np.ones(3)
     )
     assert list(first_starts(found, count)) == list(found.starts[:kept])
+
+
+def test_friction_along_the_way_may_stand_for_friction_and_waves():
+    """While the drive goes one way under one current, all three are the same force."""
+    values = {
+        "force_N": 2.0,
+        "variation_share": 0.3,
+        "period_m": 0.05,
+        "phase_rad": 0.4,
+    }
+    x, current, constant = np.linspace(0.0, 0.2, 400), 3.0, 5.0
+    wavy = -2.0 * (1.0 + 0.3 * np.sin(2 * np.pi * x / 0.05 + 0.4))
+    sets = CATALOGUE["position_friction"].imitated(values)
+    of_force = [one["cogging"] for one in sets if "cogging" in one]
+    of_drive = [one["torque_ripple"] for one in sets if "torque_ripple" in one]
+    assert all(one["coulomb_friction"] == {"force_N": 2.0} for one in sets)
+
+    cogging = [
+        one["amplitude_N"] * np.sin(2 * np.pi * x / one["period_m"] + one["phase_rad"])
+        for one in of_force
+    ]
+    assert min(np.abs(-2.0 + one - wavy).max() for one in cogging) < 1e-12
+    drive = constant * current
+    ripple = [
+        0.6 / (drive * one["share"]) * drive * one["share"]
+        * np.sin(one["per_turn"] * x + one["phase_rad"])
+        for one in of_drive
+    ]  # fmt: skip
+    assert min(np.abs(-2.0 + one - wavy).max() for one in ripple) < 1e-12
+
+
+def test_sets_that_one_effect_may_stand_for_are_screened_beside_it():
+    allowed = ("coulomb_friction", "position_friction", "torque_ripple", "cogging")
+    search = rounds.Proposals(rounds_of(FRICTION, allowed))
+    friction = {
+        "force_N": 0.6,
+        "variation_share": 0.2,
+        "period_m": 5e-3,
+        "phase_rad": 0.1,
+    }
+    of = search.rounds.problem
+    scales = search.rounds.baseline.scales
+    parent = fit(of, {"position_friction": friction}, scales=scales)
+    sets = search.of_size(2, [parent], first_parts(of, 4000))
+
+    assert {
+        ("coulomb_friction", "torque_ripple"),
+        ("cogging", "coulomb_friction"),
+    } <= set(sets)
+    start = sets["coulomb_friction", "torque_ripple"][0]
+    found = dict(zip([n.parameter for n in parent.names], parent.values, strict=True))
+    per_turn = start.effects["torque_ripple"]["per_turn"]
+    assert per_turn == pytest.approx(2 * np.pi / found["period_m"])
+    assert "position_friction" not in start.effects
+
+
+def test_what_a_filter_has_shown_is_fitted_to_whole_recordings():
+    """No way has led there from single effects: the search on them has found nothing."""
+    of = rounds_of({**FRICTION, **STIFFNESS}, FEW)
+    behind = diagnose._Searched(of, of.base.sse, [], [], run_rounds(of, 2), (), [])
+    searched = replace(behind, found=rounds.RoundsResult())
+    assert not diagnose._is_settled(searched)
+    led = diagnose._led_by(searched, behind)
+    assert led.found.best[-1].effects == ("coulomb_friction", "cubic_stiffness")
+    assert diagnose._is_settled(led)
+
+    held = replace(
+        of, problem=replace(of.problem, drive=replace(of.problem.drive, hold="zero"))
+    )
+    assert diagnose._led_by(searched, replace(behind, rounds=held)) is searched

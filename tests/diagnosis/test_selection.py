@@ -1159,3 +1159,69 @@ def test_two_changes_of_parameters_are_told_apart_by_what_changes():
     ]
     titles = ["parameter_change (mass)", "parameter_change (damping)"]
     assert [title_of(one) for one in pair] == titles
+
+
+# Ten other pairs, none of which shares both effects with the best one.
+FAR_PAIR = ("coulomb_friction", "one_sided_stop")
+OTHERS = (
+    *("cogging", "input_delay", "actuator_lag", "sensor_lag", "clock_skew"),
+    *("sensor_cubic", "sensor_quadratic", "input_saturation", "gravity", "end_stop"),
+)
+
+
+@pytest.mark.parametrize(
+    ("others", "left", "word"),
+    [
+        # 400 of 40 000 squares over the noise: 98 % are explained.
+        (OTHERS, 3.0, "named"),
+        # One that leaves less than 2.5 times as much stands beside it.
+        (OTHERS, 2.0, "unknown"),
+        # Too few were tried to say so.
+        (OTHERS[:9], 3.0, "unknown"),
+    ],
+)
+def test_a_pair_that_stands_alone_is_named_although_much_is_left(others, left, word):
+    of_base, of_pair = 40_000.0, 100.0 + 0.02 * 39_900.0
+    fits = {
+        one.effects: one
+        for one in (
+            *(made_up((effect,), 20_000.0) for effect in FAR_PAIR),
+            made_up(FAR_PAIR, of_pair, parameters=2),
+            *(
+                made_up((effect, "quadratic_drag"), left * (of_pair - 100.0) + 100.0)
+                for effect in others
+            ),
+        )
+    }
+    best = (fits["coulomb_friction",], fits[FAR_PAIR])
+    found = decide(
+        CRITERIA, np.full(6, of_base), base(of_base), fits, best, lambda _: ()
+    )
+    assert found.word == word
+    assert found.chosen.effects == (FAR_PAIR if word == "named" else ())
+
+
+def test_another_law_of_one_of_its_effects_stands_beside_no_pair():
+    pair, alike = (
+        made_up(PAIR, 900.0),
+        made_up(("hysteresis", "input_dead_zone"), 950.0),
+    )
+    others = [made_up((one, "quadratic_drag"), 4000.0) for one in OTHERS]
+    assert CRITERIA.is_alone(pair, [pair, alike, *others])
+    beside = made_up(("coulomb_friction", "input_saturation"), 950.0)
+    assert not CRITERIA.is_alone(pair, [pair, beside, *others])
+
+
+@pytest.mark.parametrize(
+    ("of_set", "word"), [(2100.0, "unknown"), (2300.0, "ambiguous")]
+)
+def test_single_effects_far_behind_a_set_are_no_two_answers(of_set, word):
+    """Each explains half; a set that explains 95 %, be it none to name, says otherwise."""
+    of_base = 40_000.0
+    singles = [made_up((one,), 20_600.0) for one in ("sensor_cubic", "supply_sag")]
+    several = made_up(PAIR, of_set, parameters=2)
+    fits = {one.effects: one for one in (*singles, several)}
+    found = decide(
+        CRITERIA, np.full(6, of_base), base(of_base), fits, (singles[0],), lambda _: ()
+    )
+    assert found.word == word

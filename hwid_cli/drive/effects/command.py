@@ -301,6 +301,7 @@ RIPPLE = Effect(
             "phase_rad",
             lambda scales: _PHASES,
             is_positive=False,
+            turn=2 * pi,
             places=("RIPPLE_PHASE",),
             default=0.0,
         ),

@@ -250,6 +250,7 @@ PERIODIC = Effect(
             "phase_rad",
             lambda scales: (0.0,),
             is_positive=False,
+            turn=2 * pi,
             is_own=True,
             trials=QUARTERS,
             places=("PERIODIC_PHASE",),

@@ -265,6 +265,7 @@ POSITION = Effect(
             "phase_rad",
             lambda scales: (-0.75 * pi, -0.25 * pi, 0.25 * pi, 0.75 * pi),
             is_positive=False,
+            turn=2 * pi,
             places=("WAVY_PHASE",),
             default=0.0,
         ),
