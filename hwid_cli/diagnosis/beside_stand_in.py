@@ -19,7 +19,7 @@ from hwid_cli.diagnosis.leads_in_simulation import leads_in_simulation
 from hwid_cli.diagnosis.own_base import with_own_base
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.simulator import Runs
-from hwid_cli.diagnosis.single_effects import single_in_simulation
+from hwid_cli.diagnosis.single_effects import single_in_simulation, to_its_end
 from hwid_cli.diagnosis.stand_in import acts_at_port
 from hwid_cli.diagnosis.tasks import OnRound
 from hwid_cli.diagnosis.told_by_runs import ToldByRuns
@@ -172,7 +172,8 @@ def _beyond_singles(
         return FoundBeside(*confirm(found, runs, values))
     if beside.options.max_runs is None:
         runs = runs.up_to(_FOR_SETS)
-    alone = with_further_effect(alone, runs, beside.options, beside.on_round)
+    both = with_further_effect(alone, runs, beside.options, beside.on_round)
+    alone = to_its_end(alone, runs) if both is alone else both
     is_told = alone.findings is not None
     if begins_anew and not _is_enough(alone):
         return FoundBeside(alone.findings or found, alone.values, is_told)

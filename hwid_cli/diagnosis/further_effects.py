@@ -13,7 +13,7 @@ from hwid_cli.diagnosis.effect_sets import with_effect
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.simulator import Runs
-from hwid_cli.diagnosis.single_effects import single_in_simulation
+from hwid_cli.diagnosis.single_effects import single_in_simulation, to_its_end
 from hwid_cli.diagnosis.tasks import OnRound
 from hwid_cli.diagnosis.told_by_runs import ToldByRuns
 from hwid_cli.diagnosis.verdict import decide
@@ -55,6 +55,8 @@ def with_further_effect(
     single = replace(options, max_effects=1, laws="never")
     told = find(beside, single, runs.run_tasks, on_round, may_cut=False)
     second = single_in_simulation(told, runs, first.values, on_round)
+    if not second.is_all:
+        second = to_its_end(second, runs)
     if second.findings is None or not second.findings.verdict.chosen.effects:
         return first
     both = _with_known(one, second.findings, known)

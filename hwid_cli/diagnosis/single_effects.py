@@ -12,6 +12,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate_words import with_best_so_far
 from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.port_effects import begin_at_port
 from hwid_cli.diagnosis.port_search import (
     at_ports_by_runs_alone,
@@ -20,6 +21,7 @@ from hwid_cli.diagnosis.port_search import (
 )
 from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED,
+    LEAST_EXPLAINED_SET,
     LEAST_GAIN,
     WITHIN_REACH,
     count,
@@ -36,7 +38,7 @@ from hwid_cli.diagnosis.turns import Turn, best_turn, fit_of_run
 from hwid_cli.diagnosis.verdict import decide
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.diagnosis import STILL_LARGE
+from hwid_cli.records.diagnosis import SMALL_REMAINDER, STILL_LARGE
 
 # Single effects that the simulation is run with: at most so many different ones, of those that leave at
 # most so many times what the best one leaves beside the stand-in, which counts as at least
@@ -48,6 +50,9 @@ _LEAST_LEFT = 0.01
 # of them leaves at most.
 _MOST_ON_INPUT = 3
 _CLEARLY_LESS = 0.5
+# What another effect leaves beside the stand-in at most, over that of one which explains most
+# in the simulation itself, to be run as well.
+_CLEARLY_BETTER = 0.8
 # A run that leaves little more than noise may turn on after the others have used up theirs.
 _TO_SETTLE = 1.5
 # Times the noise that a run leaves at most to be followed before others are tried.
@@ -87,15 +92,40 @@ def single_in_simulation(
         at_ports_by_runs_alone(tried, runs, values, may_pair=may_pair)
     _try_likely(tried, likely, runs, values, on_round)
     at_ports_later(tried, runs)
-    _follow(tried, runs, at_most=MOST_LEFT)
     tried.keep(_twins_in_simulation(findings, runs, tried.turns, tried.fits))
+    return _told(tried) or to_its_end(_untold(tried, values), runs)
+
+
+def to_its_end(so_far: ToldByRuns, runs: Runs) -> ToldByRuns:
+    """What is told once the run that leaves least was followed to its end.
+
+    That takes many runs: whatever else is looked for comes before.
+    """
+    tried = so_far.tried
+    if tried is None:
+        return so_far
+    before = dict(tried.fits)
+    _follow(tried, runs, at_most=MOST_LEFT)
+    if tried.fits == before:
+        return so_far
+    values = so_far.values
+    return _told(tried) or _untold(tried, values)
+
+
+def _told(tried: TriedEffects) -> ToldByRuns | None:
+    """What runs tell of effects; None where none may be named."""
+    findings = tried.findings
     decided = decided_by_runs(findings, tried.turns, tried.fits)
-    if decided is not None:
-        told, moved = decided
-        is_all = criteria.is_nearly_all(told.verdict.chosen, base)
-        return ToldByRuns(told, moved, is_all)
-    moved = _moved_by_best(findings, tried.turns, tried.fits, values)
-    return ToldByRuns(None, moved, is_all=False, fits=tried.fits)
+    if decided is None:
+        return None
+    told, moved = decided
+    is_all = findings.criteria.is_nearly_all(told.verdict.chosen, findings.base)
+    return ToldByRuns(told, moved, is_all, tried=tried)
+
+
+def _untold(tried: TriedEffects, values: dict[str, float]) -> ToldByRuns:
+    moved = _moved_by_best(tried.findings, tried.turns, tried.fits, values)
+    return ToldByRuns(None, moved, is_all=False, fits=tried.fits, tried=tried)
 
 
 def _try_likely(
@@ -112,6 +142,8 @@ def _try_likely(
         if runs.run_tasks.are_spent and (fits or place > 1):
             break
         if tried.is_known(one) or _is_settled_by(findings, one, fits):
+            continue
+        if _is_behind_most(findings, one, fits):
             continue
         (effect,) = one.effects
         what = f"single effects in the simulation, {place} of {len(likely)}"
@@ -283,9 +315,11 @@ def _likely(findings: Findings) -> list[CandidateFit]:
     limits = [one for one in near if one not in first
               and any(is_part_of(one, wide) for wide in first)]  # fmt: skip
 
-    def order(one: CandidateFit) -> tuple[bool, int, int]:
+    def order(one: CandidateFit) -> tuple[bool, bool, int, int]:
+        # What may as well not be there, such as play without a gap, is something else.
+        is_null = bool(unclear_effects(findings.problem, one, findings.scales))
         is_all = criteria.is_nearly_all(one, base)
-        return not is_all, -_n_including(one, near), count(one)
+        return is_null, not is_all, -_n_including(one, near), count(one)
 
     return sorted([*first, *limits], key=order)
 
@@ -361,6 +395,26 @@ def _is_settled_by(
         changes_input(f.effects) for f in done
     )
     return not (is_simpler or is_alike or _is_near(findings, one, done))
+
+
+def _is_behind_most(
+    findings: Findings, one: CandidateFit, fits: Sequence[CandidateFit]
+) -> bool:
+    """Whether runs leave little beside another effect that the stand-in prefers, too.
+
+    What is left is then of a second effect, which the runs are kept for. What changes the
+    input alone no stand-in ranks.
+    """
+    criteria, said = findings.criteria, findings.found.fits
+    best = select_best(criteria, fits, findings.base)
+    if best is None or best.effects not in said or changes_input(one.effects):
+        return False
+    if criteria.ratio(best) <= SMALL_REMAINDER:
+        # It may be another effect altogether, of which this one is a likeness.
+        return False
+    explained = criteria.evidence(best, findings.base).explained
+    least = _CLEARLY_BETTER * criteria.excess(said[best.effects])
+    return explained >= LEAST_EXPLAINED_SET and criteria.excess(one) > least
 
 
 def _is_near(

@@ -41,12 +41,15 @@ class ToldByRuns:
         Whether that run leaves so little that a further effect could not be named.
     fits : mapping of tuple of str to CandidateFit
         What runs with single effects left.
+    tried : TriedEffects or None
+        These runs; None where none was made.
     """
 
     findings: Findings | None
     values: dict[str, float]
     is_all: bool
     fits: Mapping[tuple[str, ...], CandidateFit] = field(default_factory=dict)
+    tried: "TriedEffects | None" = None
 
 
 class TriedEffects:
