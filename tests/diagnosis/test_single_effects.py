@@ -28,13 +28,23 @@ LIKELY = {
 }
 
 
+@pytest.fixture(autouse=True)
+def are_clear(monkeypatch):
+    """Made-up fits have no intervals: none reaches where its effect is not there."""
+    monkeypatch.setattr(single_effects, "unclear_effects", lambda *_: ())
+
+
 def test_variants_of_one_effect_take_no_place_of_another():
     fits = {
         (one,): made_up((one,), sse, parameters=1 + one.count(":"))
         for one, sse in LIKELY.items()
     }
     findings = SimpleNamespace(
-        criteria=CRITERIA, base=base(), found=SimpleNamespace(fits=fits)
+        criteria=CRITERIA,
+        base=base(),
+        found=SimpleNamespace(fits=fits),
+        problem=None,
+        scales=None,
     )
     found = [one.effects[0] for one in _likely(findings)]
     assert sorted(found) == sorted(LIKELY)
@@ -96,7 +106,11 @@ def test_kinds_of_friction_do_not_keep_a_dead_zone_from_the_simulation():
         for row, one in enumerate(names)
     }
     findings = SimpleNamespace(
-        criteria=CRITERIA, base=base(), found=SimpleNamespace(fits=fits)
+        criteria=CRITERIA,
+        base=base(),
+        found=SimpleNamespace(fits=fits),
+        problem=None,
+        scales=None,
     )
     found = {one.effects[0] for one in _likely(findings)}
     # Four different ones and the limit case of most.
@@ -151,7 +165,11 @@ def findings_of(sses, criteria=CRITERIA):
         for one, sse in sses.items()
     }
     return SimpleNamespace(
-        criteria=criteria, base=base(), found=SimpleNamespace(fits=fits)
+        criteria=criteria,
+        base=base(),
+        found=SimpleNamespace(fits=fits),
+        problem=None,
+        scales=None,
     )
 
 
@@ -237,7 +255,11 @@ def test_what_leaves_nothing_beside_the_stand_in_is_run_before_its_limit_case():
         )
     }
     findings = SimpleNamespace(
-        criteria=CRITERIA, base=base(1100.0), found=SimpleNamespace(fits=fits)
+        criteria=CRITERIA,
+        base=base(1100.0),
+        found=SimpleNamespace(fits=fits),
+        problem=None,
+        scales=None,
     )
     found = [one.effects[0] for one in _likely(findings)]
     assert found[:2] == ["stribeck_friction", "coulomb_friction"]
@@ -268,3 +290,40 @@ def test_a_run_near_the_noise_turns_on(monkeypatch, sse, whiteness, turns_on):
         # Once is enough.
         single_effects._follow(tried, runs, at_most=10.0)
     assert len(asked) == turns_on
+
+
+def test_play_without_a_gap_is_run_after_all_others(monkeypatch):
+    """It leaves least, and is as well another effect: its runs may be the last ones."""
+    findings = findings_of({"gear_backlash": 104.0, "input_delay": 130.0})
+    first = [one.effects[0] for one in _likely(findings)]
+
+    def unclear(_problem, one, _scales):
+        return one.effects if "gear_backlash" in one.effects else ()
+
+    monkeypatch.setattr(single_effects, "unclear_effects", unclear)
+    last = [one.effects[0] for one in _likely(findings)]
+    assert set(first) == {"gear_backlash", "input_delay"}
+    assert last == ["input_delay", "gear_backlash"]
+
+
+@pytest.mark.parametrize(
+    ("effect", "of_run", "said", "is_behind"),
+    [
+        # 300 over the noise without an effect. The run with friction leaves 48, which is
+        # more than noise; the stand-in leaves 100 with friction, and 90 with play.
+        ("output_backlash", 148.0, 190.0, True),
+        # Clearly less beside the stand-in: it may be what the machine has.
+        ("output_backlash", 148.0, 170.0, False),
+        # The run explains too little to say so, or leaves hardly anything.
+        ("output_backlash", 220.0, 190.0, False),
+        ("output_backlash", 130.0, 190.0, False),
+        # No stand-in ranks what changes the input.
+        ("input_dead_zone", 148.0, 190.0, False),
+    ],
+)
+def test_runs_are_kept_for_a_second_effect(effect, of_run, said, is_behind):
+    findings = findings_of({"coulomb_friction": 200.0, effect: said})
+    run = made_up(("coulomb_friction",), of_run)
+    one = findings.found.fits[effect,]
+    assert single_effects._is_behind_most(findings, one, [run]) is is_behind
+    assert not single_effects._is_behind_most(findings, one, [])
