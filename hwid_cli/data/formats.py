@@ -150,7 +150,10 @@ def reader_of(path: PurePath) -> Reader:
     for reader in READERS:
         if ending_of(path) in reader.suffixes:
             if is_packed(path) and not reader.may_be_packed:
-                break
+                raise MeasurementError(
+                    f"{path}: is packed, and so are text and JSON read alone; expected "
+                    "the file itself; unpack it"
+                )
             return reader
     raise MeasurementError(
         f"{path}: has the ending {path.suffix!r}; expected one of "

@@ -1,3 +1,5 @@
+import gzip
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -370,3 +372,18 @@ def test_what_is_beyond_an_oscilloscopes_range_is_no_number(read):
     rows[30] = "30;∞;30"
     _, u, _ = read("\n".join(["t;u;y", *rows]) + "\n")
     assert np.flatnonzero(np.isnan(u)).tolist() == [30]
+
+
+def test_what_is_packed_badly_or_is_no_text_is_one_line(tmp_path):
+    text = "t,u,y\n" + "\n".join(f"{n},{n},{2 * n}" for n in range(200))
+    packed = gzip.compress(text.encode())
+    (tmp_path / "run.csv.gz").write_bytes(packed)
+    (tmp_path / "half.csv.gz").write_bytes(packed[: len(packed) // 2])
+    (tmp_path / "run.mat.gz").write_bytes(packed)
+    columns = Columns(time="t", input="u", output="y")
+    found = read_columns(tmp_path / "run.csv.gz", columns)
+    np.testing.assert_array_equal(found.output.values, 2.0 * np.arange(200))
+    with pytest.raises(MeasurementError, match=r"half.csv.gz: cannot be read \(Compre"):
+        read_columns(tmp_path / "half.csv.gz", columns)
+    with pytest.raises(MeasurementError, match=r"run.mat.gz: is packed, .*unpack it"):
+        read_columns(tmp_path / "run.mat.gz", columns)
