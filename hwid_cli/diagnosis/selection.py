@@ -14,6 +14,7 @@ from math import inf
 import numpy as np
 import scipy
 
+from hwid_cli.diagnosis.effect_sets import includes_one_of
 from hwid_cli.diagnosis.noise import noise_levels
 from hwid_cli.diagnosis.parameters import BASE, START, is_factor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
@@ -579,20 +580,13 @@ def has_size(found: CandidateFit) -> bool:
 
 
 def _is_it_but_for_a_law(one: CandidateFit, other: CandidateFit) -> bool:
-    """Whether two sets differ in one effect, by one that it includes or is included in."""
-    more, less = (
-        set(one.effects) - set(other.effects),
-        set(other.effects) - set(one.effects),
+    """Whether two sets are one but for another law of an effect, or one that it includes."""
+    sets = (one.effects, other.effects)
+    kinds = [sorted(map(public_id, each)) for each in sets]
+    is_included = includes_one_of(sets[0], [sets[1]]) or includes_one_of(
+        sets[1], [sets[0]]
     )
-    if not len(more) == 1 == len(less):
-        return False
-    (two,), (three,) = more, less
-    is_one_kind = public_id(two) == public_id(three)
-    return (
-        is_one_kind
-        or three in CATALOGUE[two].contains
-        or two in CATALOGUE[three].contains
-    )
+    return kinds[0] == kinds[1] or is_included
 
 
 def holds_look_alikes(found: CandidateFit) -> bool:
