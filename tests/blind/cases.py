@@ -14,7 +14,7 @@ SEEDS = {"development": 1000, "reporting": 880000}
 NOISE_PERCENT = (0.1, 1.0, 3.0)
 NUISANCE_NOISE_PERCENT = 0.5
 SMALL_SIZES = (0.1, 0.3)
-OUTSIDE = ("creep", "position_friction", "varying_stiffness", "random_force")
+OUTSIDE = ("creep", "varying_stiffness", "random_force")
 # Laws next to those of the catalogue, and the names that do them justice.
 NEAR = {
     "lugre_friction": (
@@ -28,6 +28,8 @@ NEAR = {
     "sinh_spring": ("cubic_stiffness",),
     "asymmetric_dead_zone": ("input_dead_zone",),
     "settled_periodic_force": ("periodic_force",),
+    # It goes with |x|, which is the force of the spring: load_friction has entered since.
+    "position_friction": ("load_friction",),
 }
 # A gain that differs between recordings is a parameter change: naming it is right.
 ACCEPTABLE_NUISANCES = {"gain_spread": ("parameter_change",)}
