@@ -7,13 +7,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from hwid_cli.diagnosis.candidate import rebuilt, without_owner
+from hwid_cli.diagnosis.choice import WITHIN_REACH
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.parameters import residuals_at, sum_of_squares
-from hwid_cli.diagnosis.selection import (
-    LEAST_EXPLAINED,
-    LEAST_LAST_CONTRIBUTION,
-    WITHIN_REACH,
-)
+from hwid_cli.diagnosis.selection import LEAST_EXPLAINED, LEAST_LAST_CONTRIBUTION
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import acts_at_port

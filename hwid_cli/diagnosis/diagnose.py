@@ -23,9 +23,7 @@ from hwid_cli.diagnosis.candidate import (
     Baseline,
     compared_with_fit,
     fitted_drive,
-    rebuilt,
 )
-from hwid_cli.diagnosis.candidate_words import title_of
 from hwid_cli.diagnosis.causes import without_damage, without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
 from hwid_cli.diagnosis.found_start import with_found_start
@@ -38,18 +36,9 @@ from hwid_cli.diagnosis.held_command import (
     with_held_command,
 )
 from hwid_cli.diagnosis.held_out import held_out_names
-from hwid_cli.diagnosis.hidden import HiddenEffect, hidden_effects
 from hwid_cli.diagnosis.judgement import decided, is_lost
 from hwid_cli.diagnosis.latent_force import Smoothed, latent_force
 from hwid_cli.diagnosis.laws import find_law
-from hwid_cli.diagnosis.next_experiment import (
-    UNDECIDED,
-    FittedCandidate,
-    played,
-    separation,
-    undecided_candidates,
-    with_best_lead,
-)
 from hwid_cli.diagnosis.noise_filter import (
     FilteredTasks,
     filtered_sentence,
@@ -121,20 +110,20 @@ def diagnose(
     on_round : callable
         Called with what begins and its number of tasks.
     """
-    problem = _problem(recordings, simulation, options)
+    problem = problem_of(recordings, simulation, options)
     found = find(problem, options, run_tasks, on_round)
     chosen = found.verdict.chosen
     if chosen.effects or not unseen_in_command(problem, chosen, found.scales):
         return describe(found)
     # The machine has answered to the logged input, whatever has asked for it.
-    problem = _problem(recordings, replace(simulation, controller=None), options)
+    problem = problem_of(recordings, replace(simulation, controller=None), options)
     behind = find(problem, options, run_tasks, on_round)
     if not behind.verdict.chosen.effects:
         return describe(found)
     return describe(replace(behind, warnings=(*behind.warnings, _BEHIND_INPUT)))
 
 
-def _problem(
+def problem_of(
     recordings: Sequence[Recording],
     simulation: SimulationOptions,
     options: DiagnoseOptions,
@@ -143,130 +132,6 @@ def _problem(
     held_out = held_out_of(recordings, options)
     problem = prepare(recordings, simulation, options, held_out)
     return without_damage(without_repeats(problem))
-
-
-@dataclass(frozen=True, eq=False)
-class Separations:
-    """How far inputs bring the candidates apart that a diagnosis cannot tell apart.
-
-    Parameters
-    ----------
-    titles : tuple of str
-        The candidates, the best one first.
-    ratios : ndarray, shape (n_inputs,), [-]
-        Least distance of a rival from the best one, over the noise; NaN where a
-        candidate cannot be simulated.
-    """
-
-    titles: tuple[str, ...]
-    ratios: np.ndarray
-
-
-def separations(
-    recordings: Sequence[Recording],
-    simulation: SimulationOptions,
-    options: DiagnoseOptions,
-    inputs: Sequence[np.ndarray],
-    run_tasks: RunTasks,
-    on_round: OnRound,
-) -> Separations:
-    """Simulate the candidates of an undecided diagnosis on inputs.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        Of the diagnosis, whose tasks are asked for again.
-    inputs : sequence of ndarray, shape (n_samples,), [input unit]
-        That could be played, at the sample time of the recordings.
-
-    References
-    ----------
-    docs/method_diagnosis.md, eq. (D26).
-    """
-    problem = _problem(recordings, simulation, options)
-    found = find(problem, options, run_tasks, on_round)
-    candidates = _undecided(found)
-    titles = tuple(title_of(one) for one in candidates)
-    if len(candidates) < 2:
-        return Separations(titles, np.full(len(inputs), np.nan))
-    best, *rivals = (
-        FittedCandidate(*rebuilt(problem, one, found.scales)) for one in candidates
-    )
-    noise = max(found.criteria.noise.rms, np.finfo(float).tiny)
-    ratios = [
-        min(separation(problem, best, rival, one) for rival in rivals) / noise
-        for one in inputs
-    ]
-    return Separations(titles, np.array(ratios))
-
-
-def answers(
-    recordings: Sequence[Recording],
-    simulation: SimulationOptions,
-    options: DiagnoseOptions,
-    inputs: Sequence[np.ndarray],
-    run_tasks: RunTasks,
-    on_round: OnRound,
-) -> list[tuple[np.ndarray, ...]]:
-    """Simulate what a diagnosis leaves, on inputs.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        Of the diagnosis, whose tasks are asked for again.
-    inputs : sequence of ndarray, shape (n_samples,), [input unit]
-        That could be played, at the sample time of the recordings.
-
-    Returns
-    -------
-    list of tuple of ndarray, shape (n_samples,), [output unit]
-        For each input the output of each candidate that may be the machine.
-    """
-    problem = _problem(recordings, simulation, options)
-    found = find(problem, options, run_tasks, on_round)
-    candidates = [found.verdict.chosen]
-    if found.verdict.word in UNDECIDED:
-        candidates = _undecided(found)
-    fitted = [
-        FittedCandidate(*rebuilt(problem, one, found.scales)) for one in candidates
-    ]
-    return [
-        tuple(played(problem, each, one)[1].output for each in fitted) for one in inputs
-    ]
-
-
-def _undecided(found: Findings) -> list[CandidateFit]:
-    """Candidates of an undecided diagnosis, the best one first."""
-    criteria, fits = found.criteria, list(found.found.fits.values())
-    candidates = undecided_candidates(criteria, found.verdict, fits)
-    return with_best_lead(criteria, candidates, fits)
-
-
-def hidden(
-    recordings: Sequence[Recording],
-    simulation: SimulationOptions,
-    options: DiagnoseOptions,
-    inputs: Sequence[np.ndarray],
-    run_tasks: RunTasks,
-    on_round: OnRound,
-) -> list[HiddenEffect]:
-    """Look for effects that a diagnosis does not name, in inputs.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        Of the diagnosis, whose tasks are asked for again.
-    inputs : sequence of ndarray, shape (n_samples,), [input unit]
-        That could be played, at the sample time of the recordings.
-
-    References
-    ----------
-    docs/method_diagnosis.md, eq. (D26b).
-    """
-    problem = _problem(recordings, simulation, options)
-    found = find(problem, options, run_tasks, on_round)
-    on_round("hidden effects", 0)
-    return hidden_effects(found, allowed_effects(problem, options), inputs, run_tasks)
 
 
 def held_out_of(

@@ -16,11 +16,13 @@ from hwid_cli.diagnosis.candidate import (
     compared_with_fit,
     start_from,
 )
+from hwid_cli.diagnosis.choice import NEARLY_THE_REST, TIE
 from hwid_cli.diagnosis.effect_sets import Effects
+from hwid_cli.diagnosis.fit_facts import count
 from hwid_cli.diagnosis.growing import is_rugged
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.rounds import RoundsResult
-from hwid_cli.diagnosis.selection import LEAST_GAIN, NEARLY_THE_REST, TIE, count
+from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.set_fits import FAR_BEHIND, Rounds, fit_task, growing_task
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.drive import HELD, LINE

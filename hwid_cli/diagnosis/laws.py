@@ -22,6 +22,8 @@ from hwid_cli.diagnosis.candidate import (
     present_start,
     start_from,
 )
+from hwid_cli.diagnosis.choice import TIE
+from hwid_cli.diagnosis.fit_facts import has_own_values
 from hwid_cli.diagnosis.intervals import intervals, unclear_effects
 from hwid_cli.diagnosis.latent_force import Smoothed
 from hwid_cli.diagnosis.law_names import effects_of
@@ -37,12 +39,7 @@ from hwid_cli.diagnosis.law_search import (
 from hwid_cli.diagnosis.law_terms import Term, coefficient_unit, library, readings
 from hwid_cli.diagnosis.problem import Compared
 from hwid_cli.diagnosis.rounds import RoundsResult
-from hwid_cli.diagnosis.selection import (
-    LEAST_GAIN,
-    LEAST_IMPROVED,
-    TIE,
-    has_own_values,
-)
+from hwid_cli.diagnosis.selection import LEAST_GAIN, LEAST_IMPROVED
 from hwid_cli.diagnosis.set_fits import Rounds, has_many_samples
 from hwid_cli.diagnosis.tasks import DiagnosisTask
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, needs_each

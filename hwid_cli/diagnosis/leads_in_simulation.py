@@ -8,7 +8,8 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate_words import title_of, with_best_so_far
 from hwid_cli.diagnosis.findings import Findings
-from hwid_cli.diagnosis.selection import LEAST_GAIN, count
+from hwid_cli.diagnosis.fit_facts import count
+from hwid_cli.diagnosis.selection import LEAST_GAIN
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.tasks import OnRound

@@ -13,6 +13,7 @@ import numpy as np
 
 from hwid_cli.diagnosis.candidate import belongs_to, rebuilt
 from hwid_cli.diagnosis.candidate_words import title_of
+from hwid_cli.diagnosis.choice import TIE
 from hwid_cli.diagnosis.parameters import (
     ParameterLayout,
     ParameterPoint,
@@ -21,7 +22,7 @@ from hwid_cli.diagnosis.parameters import (
 )
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.search import derivatives
-from hwid_cli.diagnosis.selection import TIE, SelectionCriteria
+from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict
 from hwid_cli.drive.effect import Scales
 from hwid_cli.drive.simulation import Motion

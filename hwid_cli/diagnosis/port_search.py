@@ -10,6 +10,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from hwid_cli.diagnosis.candidate import fitted_effects
+from hwid_cli.diagnosis.choice import WITHIN_REACH
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.port_effects import (
     PortStart,
@@ -18,7 +19,6 @@ from hwid_cli.diagnosis.port_effects import (
     with_port_effects,
 )
 from hwid_cli.diagnosis.port_screening import LikelyAtPort, screened_at_ports
-from hwid_cli.diagnosis.selection import WITHIN_REACH
 from hwid_cli.diagnosis.simulator import Runs
 from hwid_cli.diagnosis.stand_in import acts_at_port
 from hwid_cli.diagnosis.told_by_runs import TriedEffects

@@ -15,6 +15,7 @@ from hwid_cli.diagnosis.candidate import (
     start_from,
     start_values,
 )
+from hwid_cli.diagnosis.choice import LEAST_ADDED
 from hwid_cli.diagnosis.effect_sets import (
     Effects,
     includes_one_of,
@@ -26,7 +27,7 @@ from hwid_cli.diagnosis.effect_sets import (
     with_effect,
     without_effect,
 )
-from hwid_cli.diagnosis.selection import LEAST_ADDED, has_own_values
+from hwid_cli.diagnosis.fit_facts import has_own_values
 from hwid_cli.diagnosis.set_fits import (
     FAR_BEHIND,
     LEAST_LEFT,

@@ -17,8 +17,10 @@ from hwid_cli.diagnosis.candidate import (
     SearchStart,
     start_from,
 )
+from hwid_cli.diagnosis.choice import LEAST_ADDED
 from hwid_cli.diagnosis.effect_sets import Effects, includes_one_of
 from hwid_cli.diagnosis.few_samples import fewer_recordings
+from hwid_cli.diagnosis.fit_facts import has_own_values, is_part_of
 from hwid_cli.diagnosis.intervals import runs_to_bound
 from hwid_cli.diagnosis.problem import DiagnosisProblem
 from hwid_cli.diagnosis.proposals import Proposals
@@ -30,7 +32,6 @@ from hwid_cli.diagnosis.related_sets import (
     that_add,
     without_each,
 )
-from hwid_cli.diagnosis.selection import LEAST_ADDED, has_own_values, is_part_of
 from hwid_cli.diagnosis.set_fits import (
     FAR_BEHIND,
     LEAST_LEFT,

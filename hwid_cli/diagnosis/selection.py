@@ -1,4 +1,4 @@
-"""Which candidate is best, and whether its evidence suffices for a name.
+"""Whether the evidence for a candidate suffices for a name, and what it leaves.
 
 An information criterion alone names something even where nothing is missing: input
 noise or a coarse sensor is enough. Naming therefore also asks for held-out recordings:
@@ -8,17 +8,23 @@ docs/method_diagnosis.md, eq. (D21) to (D24).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from math import inf
 
 import numpy as np
 import scipy
 
-from hwid_cli.diagnosis.effect_sets import includes_one_of
+from hwid_cli.diagnosis.fit_facts import (
+    count,
+    count_starts,
+    has_own_values,
+    has_size,
+    holds_look_alikes,
+    is_one_but_for_a_law,
+)
 from hwid_cli.diagnosis.noise import noise_levels
-from hwid_cli.diagnosis.parameters import BASE, START, is_factor
+from hwid_cli.diagnosis.parameters import BASE, is_factor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
-from hwid_cli.drive.catalogue import CATALOGUE, public_id
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import LIKE_INPUT_NOISE, CandidateFit
 from hwid_cli.records.diagnosis import (
     LEAST_SURE,
@@ -60,8 +66,6 @@ CHANCE = 1e-3
 _LEAST_FREEDOM = 3
 # A recording counts where its sum of squares changes by this share of the mean change.
 LEAST_CHANGE = 0.1
-# Changes of a parameter between recordings below this are scatter, [-].
-LEAST_SPREAD = 0.01
 # Residuals that go together all along still count as so many pieces of each recording:
 # it rises, holds and falls, fast and slowly.
 LEAST_PIECES = 10
@@ -70,11 +74,6 @@ CLOSE_TO_NOISE = 1.03
 # Ratio to the noise of noise and what is a third as large: drifts and other flaws of
 # measuring are of that size.
 A_THIRD_MORE = float(np.sqrt(1 + 1 / 9))
-# Candidates closer than this are not told apart.
-TIE = 6.0
-# Nor are those that leave at most so many times as much beyond the noise, where both
-# leave something.
-WITHIN_REACH = 1.25
 # The base of a stand-in that a candidate changes by more than this factor is no longer that
 # of the simulation. A damping may be near nothing, and so its factor anything.
 REPLACED = 3.0
@@ -85,13 +84,6 @@ _OF_SIMULATION = (_SPRING, "force_constant_N_per_A")
 LEAST_OF_FORCES = 0.01
 # What is named explains this many times what a stand-in may be wrong by, at least.
 LEAST_OVER_STAND_IN = 10.0
-# An effect that includes another one must add this share of what both gain.
-LEAST_ADDED = 0.03
-# Or it brings this share of what the included one leaves, where that is much.
-NEARLY_THE_REST = 0.9
-# Or what it leaves is nearly white (1 passes the test), where the included one is this far
-# from it.
-NEARLY_WHITE, FAR_FROM_WHITE = 2.0, 20.0
 
 
 @dataclass(frozen=True)
@@ -254,7 +246,7 @@ class SelectionCriteria:
         more = count(found) - count(other)
         # How recordings start shows in their first samples only, whatever n: each such
         # value is charged what it gains by chance.
-        starts = _count_starts(found) - _count_starts(other)
+        starts = count_starts(found) - count_starts(other)
         return float(n * fits - more * np.log(max(n, 2.0)) - starts)
 
     def excess(self, found: CandidateFit) -> float:
@@ -383,7 +375,7 @@ class SelectionCriteria:
             Of its size. Those that are it but for another law of one effect do not count.
         """
         others = [one for one in tried if one is not found and one.is_usable]
-        others = [one for one in others if not _is_it_but_for_a_law(one, found)]
+        others = [one for one in others if not is_one_but_for_a_law(one, found)]
         most = ALONE * self.excess(found)
         return len(others) >= LEAST_OF_SIZE and all(
             self.excess(one) >= most for one in others
@@ -558,186 +550,3 @@ def _goes_with(values: np.ndarray, inputs: np.ndarray) -> bool:
     unexplained = float(left @ left)
     ratio = (whole - unexplained) / used.shape[1] / max(unexplained / freedom, 1e-300)
     return bool(scipy.special.fdtrc(used.shape[1], freedom, ratio) < CHANCE)
-
-
-def count(found: CandidateFit) -> int:
-    """Number of parameters of a candidate, without how recordings start."""
-    own = sum(one.owner != START for one in found.own_names)
-    return int(found.values.size + own * found.own.shape[0])
-
-
-def _count_starts(found: CandidateFit) -> int:
-    starts = sum(one.owner == START for one in found.own_names)
-    return int(starts * found.own.shape[0])
-
-
-def has_size(found: CandidateFit) -> bool:
-    """Whether changes between recordings are more than scatter."""
-    return not any(
-        is_factor(one) and float(np.std(found.own[:, column])) < LEAST_SPREAD
-        for column, one in enumerate(found.own_names)
-    )
-
-
-def _is_it_but_for_a_law(one: CandidateFit, other: CandidateFit) -> bool:
-    """Whether two sets are one but for another law of an effect, or one that it includes."""
-    sets = (one.effects, other.effects)
-    kinds = [sorted(map(public_id, each)) for each in sets]
-    is_included = includes_one_of(sets[0], [sets[1]]) or includes_one_of(
-        sets[1], [sets[0]]
-    )
-    return kinds[0] == kinds[1] or is_included
-
-
-def holds_look_alikes(found: CandidateFit) -> bool:
-    """Whether two effects of a set look like each other.
-
-    Where something remains beside both, they imitate one law that is neither.
-    """
-    return any(
-        public_id(one) in CATALOGUE[two].confused_with
-        and public_id(two) in CATALOGUE[one].confused_with
-        for one, two in combinations(found.effects, 2)
-        if public_id(one) != public_id(two)
-    )
-
-
-def select_best(
-    criteria: SelectionCriteria, found: Sequence[CandidateFit], base: CandidateFit
-) -> CandidateFit | None:
-    """Pick the best candidate, the simplest of those that are as good.
-
-    Parameters
-    ----------
-    found : sequence of CandidateFit
-        Of sets of the same size.
-
-    Returns
-    -------
-    CandidateFit or None
-        None where nothing could be simulated.
-    """
-    usable = [one for one in found if one.is_usable]
-    if not usable:
-        return None
-    best = max(usable, key=lambda one: criteria.gain(one, base))
-    for rival in sorted(usable, key=count):
-        if count(rival) >= count(best) and not _has_fewer_kinds(rival, best):
-            continue
-        if is_part_of(rival, best):
-            if not _adds_enough(criteria, best, rival, base):
-                best = rival
-        elif criteria.gain(best, rival) < TIE:
-            best = rival
-    return best
-
-
-def is_part_of(smaller: CandidateFit, larger: CandidateFit) -> bool:
-    """Whether each effect of one set is in the other, or a limit case of one there."""
-    left = list(larger.effects)
-    for effect in smaller.effects:
-        match = next(
-            (one for one in left if one == effect or effect in CATALOGUE[one].contains),
-            None,
-        )
-        if match is None:
-            return False
-        left.remove(match)
-    return True
-
-
-def _has_fewer_kinds(one: CandidateFit, other: CandidateFit) -> bool:
-    """Whether a set needs only some of another's kinds of effects: one of them twice."""
-    kinds, others = set(names_of(one)), set(names_of(other))
-    return kinds < others and count(one) <= count(other)
-
-
-def _adds_enough(
-    criteria: SelectionCriteria,
-    larger: CandidateFit,
-    smaller: CandidateFit,
-    base: CandidateFit,
-) -> bool:
-    gain = criteria.gain(larger, smaller)
-    if gain < TIE:
-        return False
-    added = smaller.sse.sum() - larger.sse.sum()
-    together = base.sse.sum() - larger.sse.sum()
-    is_clear = criteria.is_complete(larger) and not criteria.is_complete(smaller)
-    is_clear = is_clear or _takes_the_rest(criteria, larger, smaller)
-    is_clear = is_clear or _is_nearly_white_beside(larger, smaller)
-    return bool(added >= LEAST_ADDED * together or is_clear)
-
-
-def _takes_the_rest(
-    criteria: SelectionCriteria, larger: CandidateFit, smaller: CandidateFit
-) -> bool:
-    """Whether a set takes nearly all of a large remainder that a smaller one leaves."""
-    left = _excess_of_held_out(criteria, smaller)
-    return (
-        criteria.ratio(smaller) > SMALL_REMAINDER
-        and _excess_of_held_out(criteria, larger) <= (1 - NEARLY_THE_REST) * left
-    )
-
-
-def _is_nearly_white_beside(larger: CandidateFit, smaller: CandidateFit) -> bool:
-    """Whether a set leaves nearly white noise, and a smaller one by no means."""
-    return larger.whiteness <= NEARLY_WHITE and smaller.whiteness >= FAR_FROM_WHITE
-
-
-def rivals(
-    criteria: SelectionCriteria, found: Sequence[CandidateFit], best: CandidateFit
-) -> list[CandidateFit]:
-    """List the candidates that the data cannot tell from the best one.
-
-    Where the best one leaves nothing but noise, its criterion decides. Where it leaves
-    more, its law is not quite the machine's, and neither is a rival's: those that leave
-    about as much are as likely, of all recordings or of those that judge.
-
-    Returns
-    -------
-    list of CandidateFit
-        Those that include the best one are left out: they are measured by what they add.
-        So are those that need a further kind of effect where the best one has one kind
-        twice, and limit cases of the best one where nothing but noise is left: beside a
-        law that is not quite right, a wider one is no more likely than its limit case.
-    """
-    is_complete = criteria.is_complete(best)
-    left = criteria.excess(best)
-    most = max(WITHIN_REACH * left, left + criteria.stand_in_error)
-    judged = _excess_of_held_out(criteria, best)
-
-    def leaves_as_little(one: CandidateFit) -> bool:
-        if is_complete:
-            return False
-        there = _excess_of_held_out(criteria, one)
-        return criteria.excess(one) <= most or 0 < there <= WITHIN_REACH * judged
-
-    return [
-        one
-        for one in found
-        if one.is_usable
-        and one is not best
-        and not is_part_of(best, one)
-        and names_of(one) != names_of(best)
-        and not _has_fewer_kinds(best, one)
-        and (
-            leaves_as_little(one)
-            or (criteria.gain(best, one) < TIE and not is_part_of(one, best))
-        )
-    ]
-
-
-def _excess_of_held_out(criteria: SelectionCriteria, found: CandidateFit) -> float:
-    """Mean square beyond the noise of the recordings that judge, over the noise's, [-]."""
-    return criteria.ratio(found) ** 2 - 1.0
-
-
-def names_of(found: CandidateFit) -> tuple[str, ...]:
-    """Public ids of a set of effects, sorted."""
-    return tuple(sorted(public_id(one) for one in found.effects))
-
-
-def has_own_values(found: CandidateFit) -> bool:
-    """Whether each recording has a value for itself."""
-    return any(is_factor(one) for one in found.own_names)

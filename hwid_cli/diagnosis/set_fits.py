@@ -22,8 +22,10 @@ from hwid_cli.diagnosis.candidate import (
     with_input_noise,
 )
 from hwid_cli.diagnosis.candidate_words import with_best_so_far
+from hwid_cli.diagnosis.choice import LEAST_ADDED, select_best
 from hwid_cli.diagnosis.effect_sets import Effects
 from hwid_cli.diagnosis.few_samples import fewer_recordings
+from hwid_cli.diagnosis.fit_facts import has_own_values, is_part_of
 from hwid_cli.diagnosis.growing import (
     fit_grown,
     grown_starts,
@@ -32,13 +34,7 @@ from hwid_cli.diagnosis.growing import (
 )
 from hwid_cli.diagnosis.parameters import is_factor, sum_of_squares
 from hwid_cli.diagnosis.problem import DiagnosisProblem
-from hwid_cli.diagnosis.selection import (
-    LEAST_ADDED,
-    SelectionCriteria,
-    has_own_values,
-    is_part_of,
-    select_best,
-)
+from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.diagnosis.tasks import DiagnosisTask, OnRound, RunTasks
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import CandidateFit

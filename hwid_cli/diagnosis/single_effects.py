@@ -11,7 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.diagnosis.candidate_words import with_best_so_far
+from hwid_cli.diagnosis.choice import WITHIN_REACH, select_best
 from hwid_cli.diagnosis.findings import Findings
+from hwid_cli.diagnosis.fit_facts import count, is_part_of
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.port_effects import begin_at_port
 from hwid_cli.diagnosis.port_search import (
@@ -23,10 +25,6 @@ from hwid_cli.diagnosis.selection import (
     LEAST_EXPLAINED,
     LEAST_EXPLAINED_SET,
     LEAST_GAIN,
-    WITHIN_REACH,
-    count,
-    is_part_of,
-    select_best,
 )
 from hwid_cli.diagnosis.settling import settled
 from hwid_cli.diagnosis.simulator import Runs

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hwid_cli.diagnosis.choice import select_best
 from hwid_cli.diagnosis.findings import Findings
 from hwid_cli.diagnosis.intervals import unclear_effects
 from hwid_cli.diagnosis.own_base import is_beyond_factors, judged_by_own_base
 from hwid_cli.diagnosis.port_effects import PortStart, moving_most
 from hwid_cli.diagnosis.port_screening import AtPorts, LikelyAtPort
-from hwid_cli.diagnosis.selection import select_best
 from hwid_cli.diagnosis.stand_in import acts_at_port
 from hwid_cli.diagnosis.turns import Turn, fit_of_run
 from hwid_cli.diagnosis.verdict import decide

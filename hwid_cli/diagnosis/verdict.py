@@ -9,6 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hwid_cli.diagnosis.choice import NEARLY_THE_REST, NEARLY_WHITE, rivals
+from hwid_cli.diagnosis.fit_facts import (
+    count,
+    has_own_values,
+    has_size,
+    is_part_of,
+    names_of,
+)
 from hwid_cli.diagnosis.growing import is_rugged
 from hwid_cli.diagnosis.parameters import is_factor
 from hwid_cli.diagnosis.selection import (
@@ -20,15 +28,7 @@ from hwid_cli.diagnosis.selection import (
     LEAST_IMPROVED,
     LEAST_LAST_CONTRIBUTION,
     MOST_LEFT_BY_SET,
-    NEARLY_THE_REST,
-    NEARLY_WHITE,
     SelectionCriteria,
-    count,
-    has_own_values,
-    has_size,
-    is_part_of,
-    names_of,
-    rivals,
 )
 from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit

@@ -15,6 +15,7 @@ import numpy as np
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.simulation_checks import SIMULATION_EXAMPLE
 from hwid_cli.diagnosis import diagnose as pipeline
+from hwid_cli.diagnosis import further_inputs
 from hwid_cli.diagnosis.direction import ReversedInputError, reversal_sentence
 from hwid_cli.diagnosis.foreign import MOST_SEARCHES, diagnose_foreign
 from hwid_cli.diagnosis.hidden import HiddenEffect
@@ -452,7 +453,7 @@ def _diagnosed(given: ToDiagnose, run: RunTasks, on_round: OnRound) -> Diagnosis
 
 def undecided(
     given: ToDiagnose, runner: Runner, inputs: Sequence[np.ndarray]
-) -> pipeline.Separations:
+) -> further_inputs.Separations:
     """How far inputs bring the candidates apart that a diagnosis leaves undecided.
 
     Parameters
@@ -465,7 +466,7 @@ def undecided(
     ConfigError
         If the simulation is not the program's own drive.
     """
-    return _on_inputs(given, runner, inputs, pipeline.separations)
+    return _on_inputs(given, runner, inputs, further_inputs.separations)
 
 
 def answers(
@@ -483,7 +484,7 @@ def answers(
     ConfigError
         If the simulation is not the program's own drive.
     """
-    return _on_inputs(given, runner, inputs, pipeline.answers)
+    return _on_inputs(given, runner, inputs, further_inputs.answers)
 
 
 def hidden(
@@ -501,7 +502,7 @@ def hidden(
     ConfigError
         If the simulation is not the program's own drive.
     """
-    return _on_inputs(given, runner, inputs, pipeline.hidden)
+    return _on_inputs(given, runner, inputs, further_inputs.hidden)
 
 
 def _on_inputs(

@@ -133,7 +133,7 @@ def test_the_command_has_the_last_word_where_nothing_shows_behind_it(
 
     found = iter([Found("command", ()), Found("behind", behind)])
     for name, fake in (
-        ("_problem", lambda *_: None),
+        ("problem_of", lambda *_: None),
         ("find", lambda *_: next(found)),
         ("unseen_in_command", lambda *_: ("move_2",)),
         ("describe", lambda one: one),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hwid_cli.diagnosis.diagnose import hidden
+from hwid_cli.diagnosis.further_inputs import hidden
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.recordings import Recording

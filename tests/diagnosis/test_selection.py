@@ -6,21 +6,16 @@ import numpy as np
 import pytest
 
 from hwid_cli.diagnosis.candidate_words import title_of
+from hwid_cli.diagnosis.choice import LEAST_ADDED, TIE, rivals, select_best
+from hwid_cli.diagnosis.fit_facts import count, has_size, is_part_of
 from hwid_cli.diagnosis.parameters import BASE
 from hwid_cli.diagnosis.ranking import ranked
 from hwid_cli.diagnosis.selection import (
-    LEAST_ADDED,
     LEAST_EXPLAINED,
     LEAST_EXPLAINED_SET,
     LEAST_GAIN,
     LEAST_IMPROVED,
-    TIE,
     SelectionCriteria,
-    count,
-    has_size,
-    is_part_of,
-    rivals,
-    select_best,
 )
 from hwid_cli.diagnosis.verdict import DiagnosisVerdict, decide, lead
 from hwid_cli.drive.catalogue import CATALOGUE
