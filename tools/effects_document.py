@@ -62,8 +62,11 @@ In equations Iref and xr are what losses and errors at the reference count from:
 recordings, unless `simulation.reference_current_A` and `reference_displacement_m` say otherwise. `per_turn`, the n of sin(n x + p), counts
 periods of a turn where x is an angle in rad, and is 2 pi over the period in m on a straight axis. Laws with a memory start settled at the first
 sample (the current of a lag is what is commanded there, a delay and a rate limit have had it before), heating starts cold. Shares of a damper or of friction, s in equations of two
-bodies, are those of the body that the motor moves (`motor_damping_share` and the like). Where equations are joined by "or", a word that stands beside the parameters in `simulation.effects` says which:
-`curve`, `sensor`, `load`, `order` and so on, as each section names it; without it the first is meant.
+bodies, are those of the body that the motor moves (`motor_damping_share` and the like). Where an effect has several equations, what stands in brackets behind one asks for it in `simulation.effects`:
+a word (`curve: tanh`), or one of the parameters that it alone has; with none of them the first is meant.
+
+x counts from the zero of the output, after `calibrate` and less the zero of the sensor where a diagnosis finds one; so do the angles that count along the way (`phase_rad`, `angle_rad`). Angles in time count from the first sample of a recording.
+S is the longest way of one recording, from its smallest to its largest reading; fn that of mass and spring, and at least 2 / T, which it is on a free axis.
 """
 CHANGE = "parameter_change"
 CHANGE_SENTENCE = (
@@ -141,8 +144,15 @@ def _section(name: str, entries: Sequence[Effect]) -> str:
 
 
 def _laws(entries: Sequence[Effect]) -> list[str]:
-    """Different laws of entries with one public id."""
-    return list(dict.fromkeys(one.equation for one in entries))
+    """Different laws of entries with one public id, each with what asks for it."""
+    plain = {one.name for one in entries[0].parameters}
+    asked = {one.equation: "" for one in reversed(entries)}
+    for one in reversed(entries):
+        further = [f"`{key.name}`" for key in one.parameters if key.name not in plain]
+        said = [f"`{key}: {word}`" for key, word in one.words.items()]
+        asked[one.equation] = ", ".join(said or further)
+    laws = dict.fromkeys(one.equation for one in entries)
+    return [f"{law}   ({asked[law]})" if asked[law] else law for law in laws]
 
 
 def _sentence(entries: Sequence[Effect]) -> str:
