@@ -40,6 +40,7 @@ from hwid_cli.diagnosis.set_fits import (
     SetFits,
     name_of,
 )
+from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.diagnosis import SMALL_REMAINDER
 
@@ -243,7 +244,8 @@ class _Search:
         """Whether a set may be better than those that it includes.
 
         Not where one of these leaves nothing but noise, or was a wider one itself and
-        brought nothing: no shape of hysteresis is needed where hysteresis is not.
+        brought nothing: no shape of hysteresis is needed where hysteresis is not. Where
+        play starts matters only where play itself explains much.
         """
         narrow = [one for one in screened if includes_one_of(ids, [one])]
         criteria = self.rounds.criteria
@@ -252,6 +254,11 @@ class _Search:
         is_large = criteria.ratio(self.rounds.base) > SMALL_REMAINDER
         if is_large and any(criteria.is_complete(one) for one in fits):
             return False
+        if any(CATALOGUE[one].is_of_start for one in ids) and narrow:
+            part = self.fits.largest_part(ids)
+            return self._stands_out(
+                [screened[one] for one in narrow], part or self.rounds.base
+            )
         wide = [one for one in narrow if includes_one_of(one, screened)]
         return not wide or any(self._brought(one, screened) for one in wide)
 

@@ -243,6 +243,9 @@ NOT_NEGATIVE = Limit("a number >= 0", lambda value: value >= 0)
 # Of exponents: below 1 a force would begin infinitely steep.
 AT_LEAST_1 = Limit("a number >= 1", lambda value: value >= 1)
 
+# Of shares with a sign.
+AT_MOST_1 = Limit("a number from -1 to 1", lambda value: abs(value) <= 1)
+
 
 def bend(values: Values) -> float:
     """By how much an exponent exceeds that of a straight law.
@@ -357,6 +360,21 @@ def ratio_of_lag(place: str) -> Parameter:
     )
 
 
+def start_in_play(place: str) -> Parameter:
+    """Where in its play a recording starts, which is where the last motion left it."""
+    return Parameter(
+        "start_share",
+        lambda scales: (0.0,),
+        lambda scales: (-1.0, 1.0),
+        is_positive=False,
+        is_own=True,
+        trials=(-1.0, 0.0, 1.0),
+        places=(place,),
+        default=0.0,
+        limits=(AT_MOST_1,),
+    )
+
+
 @dataclass(frozen=True)
 class Effect:
     """The declaration of one effect.
@@ -417,6 +435,8 @@ class Effect:
         Whether values make sense together, where bounds of each alone do not say it.
     is_linear : bool
         Whether it is a linear system with states of its own.
+    is_of_start : bool
+        Whether it differs from what it contains in how a recording starts alone.
     beside : str
         Id of the entry of which this is the second one; without that it means nothing.
     formula : Formula or None
@@ -447,6 +467,7 @@ class Effect:
     is_of_clock: bool = False
     is_of_base: bool = False
     is_linear: bool = False
+    is_of_start: bool = False
     strength: str = ""
     size: Callable[[Values, Scales], float] | None = None
     told_by: str = ""

@@ -33,7 +33,7 @@ def read(
     """
     output = positions.copy()
     if p[slots.OUTPUT_GAP] > 0.0:
-        output = _play(positions, velocities, sample_time, p[slots.OUTPUT_GAP])
+        output = _play(positions, velocities, sample_time, p)
     for i in range(output.size):
         lag = positions[i] - output[i]
         time = sample_time * i
@@ -196,15 +196,15 @@ def _play(
     positions: np.ndarray,
     velocities: np.ndarray,
     sample_time: float,
-    half_gap: float,
+    p: np.ndarray,
 ) -> np.ndarray:
     """Return what follows the position with play.
 
     A turning point between two samples pushes further than both of them: it is found on
     the cubic through positions and velocities.
     """
-    followed = np.empty(positions.size)
-    y = positions[0]
+    followed, half_gap = np.empty(positions.size), p[slots.OUTPUT_GAP]
+    y = positions[0] + p[slots.OUTPUT_START] * half_gap
     followed[0] = y
     for i in range(1, positions.size):
         x0, x1 = positions[i - 1], positions[i]

@@ -151,5 +151,7 @@ that is switched off is 0, except where the comment says infinite.
     SIDE_DASHPOT,
     SECOND_DASHPOT,
     LOOP_RESET,  # rate at which what drives beside the spring is summed up
+    GEAR_START,
+    OUTPUT_START,
     N_SLOTS,
-) = range(144)
+) = range(146)

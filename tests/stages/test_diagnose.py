@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from hwid_cli.drive.catalogue import CATALOGUE
+from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.records.drive import BASE_PARAMETERS
 from hwid_cli.records.experiment import DiagnoseOptions
@@ -275,8 +275,10 @@ def test_chosen_recordings_are_held_out(with_friction):
 
 
 def test_only_effects_that_are_asked_for_are_tried(friction_found):
-    tried = {one.effects for one in friction_found.candidates}
-    assert tried == {("coulomb_friction",), ("input_dead_zone",), ("output_backlash",)}
+    tried = {
+        public_id(one) for each in friction_found.candidates for one in each.effects
+    }
+    assert tried == {"coulomb_friction", "input_dead_zone", "output_backlash"}
 
 
 @pytest.mark.thorough

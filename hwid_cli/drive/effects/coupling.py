@@ -20,6 +20,7 @@ from hwid_cli.drive.effect import (
     line_bounds,
     shares_of,
     span_of,
+    start_in_play,
 )
 
 
@@ -197,6 +198,16 @@ GEAR = Effect(
     is_of_base=True,
 )
 
+# Without a force the teeth rest anywhere within the gap.
+GEAR_BEGUN = replace(
+    GEAR,
+    id="gear_backlash:begun",
+    equation=f"{GEAR.equation}; xm = x + s g at the start",
+    parameters=(*GEAR.parameters, start_in_play("GEAR_START")),
+    contains=("gear_backlash", *GEAR.contains),
+    is_of_start=True,
+)
+
 MODE = Effect(
     id="second_mode",
     sentence="a flexible part that swings along",
@@ -356,4 +367,4 @@ ELASTIC_LOAD = _elastic(
     },
 )
 
-EFFECTS = (GEAR, MODE, PERIODIC, ELASTIC_MOTOR, ELASTIC_LOAD)
+EFFECTS = (GEAR, GEAR_BEGUN, MODE, PERIODIC, ELASTIC_MOTOR, ELASTIC_LOAD)

@@ -3,6 +3,7 @@
 docs/method_diagnosis.md, eq. (D14).
 """
 
+from dataclasses import replace
 from math import inf, pi
 
 from hwid_cli.drive.effect import (
@@ -16,6 +17,7 @@ from hwid_cli.drive.effect import (
     ratio_of_lag,
     shares_of,
     span_of,
+    start_in_play,
     time_bounds,
     time_shares,
 )
@@ -38,6 +40,16 @@ BACKLASH = Effect(
         "coulomb_friction": "sines of medium frequency, which reverse at speed",
         "gear_backlash": "reversals with the spring unloaded",
     },
+)
+
+# At rest it is anywhere within the play.
+BACKLASH_BEGUN = replace(
+    BACKLASH,
+    id="output_backlash:begun",
+    equation="y = play(x, b), which starts at x + s b",
+    parameters=(*BACKLASH.parameters, start_in_play("OUTPUT_START")),
+    contains=("output_backlash",),
+    is_of_start=True,
 )
 
 QUADRATIC = Effect(
@@ -296,6 +308,7 @@ SECOND_ORDER_LAG = Effect(
 
 EFFECTS = (
     BACKLASH,
+    BACKLASH_BEGUN,
     QUADRATIC,
     CUBIC,
     DRIFT,

@@ -300,10 +300,15 @@ def _start(
     if p[slots.GEAR_STIFFNESS] > 0.0 and driving != 0.0:
         state[MOTOR_X] += np.sign(driving) * p[slots.GEAR_GAP]
         state[MOTOR_X] += driving / p[slots.GEAR_STIFFNESS]
+    elif p[slots.GEAR_STIFFNESS] > 0.0:
+        state[MOTOR_X] += p[slots.GEAR_START] * p[slots.GEAR_GAP]
     is_placed = p[slots.IS_START_GIVEN] > 0.0 or is_anywhere(p)
     if p[slots.SENSOR_AT_MOTOR] > 0.0 and is_placed:
         # The start is that of the place that is measured.
         state[X], state[MOTOR_X] = 2.0 * state[X] - state[MOTOR_X], state[X]
+    if is_placed:
+        ahead = p[slots.OUTPUT_START] * p[slots.OUTPUT_GAP]
+        state[X], state[MOTOR_X] = state[X] - ahead, state[MOTOR_X] - ahead
     state[MOTOR_V] = state[V]
     state[PART_X], state[PART_V] = state[X], state[V]
     memory[SIDE] = np.sign(state[X])

@@ -337,6 +337,7 @@ static void begin(HWID_NAME(state) *state, double command)
         state->ends[n] = command;
     }
     state->played = state->motion[state->p[SENSOR_AT_MOTOR] > 0.0 ? MOTOR_X : X];
+    state->played += state->p[OUTPUT_START] * state->p[OUTPUT_GAP];
 }
 
 double HWID_NAME(step)(HWID_NAME(state) *state, double u)

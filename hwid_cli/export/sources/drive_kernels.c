@@ -144,7 +144,9 @@ enum {
     SIDE_DASHPOT = 140,
     SECOND_DASHPOT = 141,
     LOOP_RESET = 142,
-    N_SLOTS = 143,
+    GEAR_START = 143,
+    OUTPUT_START = 144,
+    N_SLOTS = 145,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -3718,6 +3720,9 @@ static double drive_start(double *state, double *memory, double command, double 
     int is_placed = 0;
     double t1 = 0.0;
     double t2 = 0.0;
+    double ahead = 0.0;
+    double t3 = 0.0;
+    double t4 = 0.0;
     drive_couple(p);
     drive_take_stock(sample_time, p);
     command = drive_static_command(command, p);
@@ -3760,6 +3765,10 @@ static double drive_start(double *state, double *memory, double command, double 
     if ((p[GEAR_STIFFNESS] > 0.0) && (driving != 0.0)) {
         state[MOTOR_X] += sign_of(driving) * p[GEAR_GAP];
         state[MOTOR_X] += driving / p[GEAR_STIFFNESS];
+    } else {
+        if (p[GEAR_STIFFNESS] > 0.0) {
+            state[MOTOR_X] += p[GEAR_START] * p[GEAR_GAP];
+        }
     }
     is_placed = (p[IS_START_GIVEN] > 0.0) || drive_is_anywhere(p);
     if ((p[SENSOR_AT_MOTOR] > 0.0) && is_placed) {
@@ -3767,6 +3776,13 @@ static double drive_start(double *state, double *memory, double command, double 
         t2 = state[X];
         state[X] = t1;
         state[MOTOR_X] = t2;
+    }
+    if (is_placed) {
+        ahead = p[OUTPUT_START] * p[OUTPUT_GAP];
+        t3 = state[X] - ahead;
+        t4 = state[MOTOR_X] - ahead;
+        state[X] = t3;
+        state[MOTOR_X] = t4;
     }
     state[MOTOR_V] = state[V];
     state[PART_X] = state[X];
