@@ -27,10 +27,6 @@ _CONVERTED = {
 # Diagnose section by how recordings start, and why so.
 _STARTS = {
     "rest": ("# diagnose: {max_effects: 2}",),
-    "held": (
-        "# Sines begin with a rest, where friction may hold the drive at any level.",
-        "# diagnose: {max_effects: 2, initial_state: held}",
-    ),
     "estimated": (
         "# Recordings do not all begin with a rest: how they start is fitted too.",
         "# diagnose: {max_effects: 2, initial_state: estimated}",

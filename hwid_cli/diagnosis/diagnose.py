@@ -26,7 +26,7 @@ from hwid_cli.diagnosis.candidate import (
 )
 from hwid_cli.diagnosis.causes import without_damage, without_repeats
 from hwid_cli.diagnosis.findings import Findings, describe
-from hwid_cli.diagnosis.found_start import with_found_start
+from hwid_cli.diagnosis.found_start import started_in_motion, with_found_start
 from hwid_cli.diagnosis.held_command import (
     best_of,
     does_as_well,
@@ -372,7 +372,11 @@ def _from_found_start(fitted: FittedBase, problem: DiagnosisProblem) -> FittedBa
     if fitted.base.is_usable and criteria.needs_nothing(fitted.base):
         return fitted
     found = with_found_start(problem)
-    return fitted if found is problem else fitted_base(found)
+    if found is not problem:
+        fitted = fitted_base(found)
+    if found.start == "estimated" or criteria.needs_nothing(fitted.base):
+        return fitted
+    return started_in_motion(problem, criteria, fitted.base) or fitted
 
 
 def _better_base(fitted: FittedBase, searched: _Searched) -> FittedBase | None:

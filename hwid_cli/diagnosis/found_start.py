@@ -9,10 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from hwid_cli.diagnosis.base_fit import compared_as_given
+from hwid_cli.diagnosis.base_fit import FittedBase, compared_as_given, fitted_base
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.rests import rest_length
+from hwid_cli.diagnosis.selection import SelectionCriteria
+from hwid_cli.records.candidates import CandidateFit
 from hwid_cli.records.drive import StandIn
 
 # What is seen in first samples has to be so many times its error.
@@ -30,6 +32,8 @@ _SAME = 0.3
 # Of a rest before the input moves so many count: of one that follows a step of it, those
 # in which a drive has not answered yet, [samples].
 _FEW = 16
+# What is left once all starts are fitted, over what is left from rest, at most, [-].
+_LEFT_BY_STARTS = 0.1
 # At most this share of a recording is its beginning, [-].
 _BEGINNING = 0.1
 
@@ -44,8 +48,7 @@ def with_found_start(problem: DiagnosisProblem) -> DiagnosisProblem:
         under a controller, of pieces, beside a simulation of another kind, and where a
         start is fitted already.
     """
-    is_open = problem.start == "rest" and not problem.has_starts
-    if not is_open or problem.compares_command or isinstance(problem.drive, StandIn):
+    if not _may_start_elsewhere(problem):
         return problem
     noise = noise_floor(problem).rms
     moving = tuple(one.name for one in problem.signals if _starts_in_motion(one, noise))
@@ -55,6 +58,46 @@ def with_found_start(problem: DiagnosisProblem) -> DiagnosisProblem:
     if elsewhere:
         return replace(problem, start="held", start_told_by=elsewhere)
     return problem
+
+
+def started_in_motion(
+    problem: DiagnosisProblem, criteria: SelectionCriteria, base: CandidateFit
+) -> FittedBase | None:
+    """Base with all starts fitted, where these are nearly all that was missing.
+
+    Of a fast drive few samples tell a speed, and its first ones are no parabola.
+
+    Parameters
+    ----------
+    problem : DiagnosisProblem
+        As it came, with starts at rest.
+    base : CandidateFit
+        Of recordings that start at rest.
+    """
+    if not _may_start_elsewhere(problem):
+        return None
+    free = fitted_base(replace(problem, start="estimated"))
+    most = _LEFT_BY_STARTS * criteria.excess(base)
+    if not free.base.is_usable or criteria.excess(free.base) > most:
+        return None
+    speed = [one.parameter for one in free.base.own_names].index("velocity")
+    speeds = np.abs(free.base.own[:, speed])
+    moving = tuple(
+        one.name
+        for one, first in zip(problem.signals, speeds, strict=True)
+        if first > _LEAST_SPEED * _largest_speed(one)
+    )
+    found = replace(free.problem, start_told_by=moving)
+    return replace(free, problem=found) if moving else None
+
+
+def _may_start_elsewhere(problem: DiagnosisProblem) -> bool:
+    """Whether starts are those of rest only because nothing else was said."""
+    is_open = problem.start == "rest" and not problem.has_starts
+    is_compared = not problem.compares_command and not isinstance(
+        problem.drive, StandIn
+    )
+    return is_open and is_compared
 
 
 def _starts_in_motion(signals: Signals, noise: float) -> bool:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hwid_cli.diagnosis.candidate import rebuilt
+from hwid_cli.diagnosis.candidate import belongs_to, rebuilt
 from hwid_cli.diagnosis.candidate_words import title_of
 from hwid_cli.diagnosis.diagnose import allowed_effects, find, problem_of
 from hwid_cli.diagnosis.findings import Findings
@@ -72,12 +72,10 @@ def separations(
     titles = tuple(title_of(one) for one in candidates)
     if len(candidates) < 2:
         return Separations(titles, np.full(len(inputs), np.nan))
-    best, *rivals = (
-        FittedCandidate(*rebuilt(problem, one, found.scales)) for one in candidates
-    )
+    best, *rivals = _fitted(found, candidates)
     noise = max(found.criteria.noise.rms, np.finfo(float).tiny)
     ratios = [
-        min(separation(problem, best, rival, one) for rival in rivals) / noise
+        min(separation(found.problem, best, rival, one) for rival in rivals) / noise
         for one in inputs
     ]
     return Separations(titles, np.array(ratios))
@@ -110,11 +108,10 @@ def answers(
     candidates = [found.verdict.chosen]
     if found.verdict.word in UNDECIDED:
         candidates = _undecided(found)
-    fitted = [
-        FittedCandidate(*rebuilt(problem, one, found.scales)) for one in candidates
-    ]
+    fitted = _fitted(found, candidates)
     return [
-        tuple(played(problem, each, one)[1].output for each in fitted) for one in inputs
+        tuple(played(found.problem, each, one)[1].output for each in fitted)
+        for one in inputs
     ]
 
 
@@ -122,7 +119,19 @@ def _undecided(found: Findings) -> list[CandidateFit]:
     """Candidates of an undecided diagnosis, the best one first."""
     criteria, fits = found.criteria, list(found.found.fits.values())
     candidates = undecided_candidates(criteria, found.verdict, fits)
-    return with_best_lead(criteria, candidates, fits)
+    candidates = with_best_lead(criteria, candidates, fits)
+    # A run of the simulation may have known how recordings start where a fit had found it.
+    return [one for one in candidates if belongs_to(found.problem, one, found.scales)]
+
+
+def _fitted(
+    found: Findings, candidates: Sequence[CandidateFit]
+) -> list[FittedCandidate]:
+    """Candidates in the coordinates of what the diagnosis has found of the starts."""
+    return [
+        FittedCandidate(*rebuilt(found.problem, one, found.scales))
+        for one in candidates
+    ]
 
 
 def hidden(

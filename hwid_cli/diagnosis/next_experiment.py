@@ -15,6 +15,7 @@ from hwid_cli.diagnosis.candidate import belongs_to, rebuilt
 from hwid_cli.diagnosis.candidate_words import title_of
 from hwid_cli.diagnosis.choice import TIE
 from hwid_cli.diagnosis.parameters import (
+    START,
     ParameterLayout,
     ParameterPoint,
     residuals_at,
@@ -342,19 +343,24 @@ def played(
         noise_filter=None if like.noise_filter is None else like.noise_filter.elsewhere,
     )  # fmt: skip
     one = replace(problem, signals=(signals,))
-    point = _single(candidate.point)
+    point = _at_rest(candidate)
     (truth,) = simulate_at(one, candidate.layout, point)
     seen = replace(signals, compared=truth.output, output=truth.output)
     return replace(problem, signals=(seen,)), truth
 
 
-def _single(point: ParameterPoint) -> ParameterPoint:
-    return ParameterPoint(point.shared, point.own[:1])
+def _at_rest(candidate: FittedCandidate) -> ParameterPoint:
+    """The values of one recording, which starts at rest where the first one does."""
+    own = candidate.point.own[:1].copy()
+    for column, one in enumerate(candidate.layout.own):
+        if one.owner == START and one.name != "position":
+            own[:, column] = one.coordinate(0.0)
+    return ParameterPoint(candidate.point.shared, own)
 
 
 def _left_over(asked: DiagnosisProblem, rival: FittedCandidate) -> float:
     """RMS of what the rival's parameters cannot absorb."""
-    point = _single(rival.point)
+    point = _at_rest(rival)
     parts = residuals_at(asked, rival.layout, point)
     if not np.isfinite(parts[0]).all():
         return 0.0

@@ -11,7 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.diagnosis.problem import Compared, DiagnosisProblem, Signals
+from hwid_cli.diagnosis.problem import (
+    Compared,
+    DiagnosisProblem,
+    Signals,
+    held_command,
+)
 from hwid_cli.drive import slots
 from hwid_cli.drive.catalogue import CATALOGUE
 from hwid_cli.drive.effect import Parameter, Scales
@@ -190,6 +195,9 @@ def parameter_layout(
     far = float("inf")
     if problem.has_starts:
         return ParameterLayout(tuple(shared), tuple(own), tuple(effects))
+    if problem.loop_holds:
+        reach = scales.current_A
+        own.append(Unknown(START, "command", False, reach, -far, far))
     is_moving = _starts_in_motion(problem, effects)
     if problem.start != "rest" or is_moving or _rests_anywhere(problem):
         reach = scales.displacement_m
@@ -326,29 +334,42 @@ def first_point(
     start : mapping of str to mapping of str to float
         Values of the effects.
     """
-    shared = []
-    for one in fit_layout.shared:
-        if one.owner == BASE:
-            value = getattr(drive, one.name) or one.scale
-        else:
-            value = start[one.owner][one.name]
-        shared.append(one.coordinate(value))
+    shared = [
+        one.coordinate(
+            getattr(drive, one.name) or one.scale
+            if one.owner == BASE
+            else start[one.owner][one.name]
+        )
+        for one in fit_layout.shared
+    ]
     each = np.zeros((len(problem.signals), len(fit_layout.own)))
     for column, one in enumerate(fit_layout.own):
         for row, signals in enumerate(problem.signals):
             if one.owner != START:
-                value = start[one.owner].get(one.name, 0.0)
+                value: float | None = start[one.owner].get(one.name, 0.0)
+            else:
+                value = _measured_start(one.name, signals, problem)
+            if value is not None:
                 each[row, column] = one.coordinate(value)
-            elif signals.start is not None and one.name != "current":
-                value = signals.start[0 if one.name == "position" else 1]
-                each[row, column] = one.coordinate(value)
-            elif one.name == "position" and problem.start == "estimated":
-                each[row, column] = one.coordinate(float(signals.position[0]))
-            elif one.name == "position" and problem.start == "rest":
-                each[row, column] = one.coordinate(signals.rest_position_m)
-            elif one.name == "velocity" and signals.is_velocity:
-                each[row, column] = one.coordinate(float(signals.velocity[0]))
     return ParameterPoint(np.array(shared), each)
+
+
+def _measured_start(
+    name: str, signals: Signals, problem: DiagnosisProblem
+) -> float | None:
+    """What a recording says of how it starts; None where it says nothing."""
+    controller = problem.drive.controller
+    if name == "command" and controller is not None:
+        return held_command(controller, signals)[0]
+    if signals.start is not None and name != "current":
+        return signals.start[0 if name == "position" else 1]
+    if name == "position" and problem.start == "estimated":
+        return float(signals.position[0])
+    if name == "position" and problem.start == "rest":
+        return signals.rest_position_m
+    if name == "velocity" and signals.is_velocity:
+        return float(signals.velocity[0])
+    return None
 
 
 def drive_at(
@@ -454,6 +475,7 @@ def _place_start(
         for one, q in zip(fit_layout.own, own, strict=True)
         if one.owner == START
     }
+    vector[slots.START_COMMAND] = found.pop("command", 0.0)
     if found:
         further = [found.get(one, 0.0) for one in ("velocity", "current")]
         set_start(vector, found["position"], *further)

@@ -31,6 +31,10 @@ from hwid_cli.records.recordings import Recording
 # Samples that are not used are bridged for a filter up to so many from one that is: damage
 # takes one or two, longer ones are sound and only not evaluated, [samples].
 _BRIDGED = 2
+# First samples that tell the command that a controller holds, [samples].
+_FIRST_COMMANDS = 16
+# That is clear beyond so many times its error, and this share of the command's range, [-].
+_CLEARLY_HELD, _LEAST_HELD = 5.0, 0.02
 # All move in one direction if the way back is no longer than this share of the way, [-].
 _WAY_BACK = 0.05
 
@@ -248,6 +252,9 @@ class DiagnosisProblem:
     command_tells_start : bool
         Whether the command that is compared shows where a recording starts better than
         the sensor does.
+    loop_holds : bool
+        Whether the sum of a controller holds a command when recordings begin, as against
+        a weight.
     """
 
     signals: tuple[Signals, ...]
@@ -262,6 +269,7 @@ class DiagnosisProblem:
     damaged: tuple[str, ...] = ()
     may_be_held: bool = False
     command_tells_start: bool = False
+    loop_holds: bool = False
 
     @property
     def compares_command(self) -> bool:
@@ -414,7 +422,39 @@ def prepare(
         {name_inside(name): share for name, share in simulation.known.items()},
         may_be_held=simulation.hold == UNSAID_HOLD and simulation.controller is None,
         command_tells_start=_command_tells_start(drive.controller, signals),
+        loop_holds=_loop_holds(drive.controller, signals),
     )
+
+
+def held_command(controller: Controller, signals: Signals) -> tuple[float, float]:
+    """Command that the sum of a controller holds when a recording begins, and its error.
+
+    Returns
+    -------
+    held, error : float, [input unit]
+        From samples in which the reference has not moved yet, and few of these: a sum
+        that was empty fills while a weight sinks.
+    """
+    count = min(max(rest_length(signals.driven_by), 1), _FIRST_COMMANDS)
+    error = signals.driven_by[:count] - signals.output[:count]
+    held = signals.compared[:count] - controller.at_once_per_position * error
+    noise = differences_rms([signals.compared], 0.0)
+    return float(held.mean()), noise / float(np.sqrt(count))
+
+
+def _loop_holds(controller: Controller | None, all_signals: Sequence[Signals]) -> bool:
+    """Whether a controller's sum is not empty when most recordings begin.
+
+    One whose loop was closed with the recording begins with the command of its error.
+    """
+    if controller is None or not controller.has_sum:
+        return False
+    clear = []
+    for one in all_signals:
+        held, error = held_command(controller, one)
+        least = max(_CLEARLY_HELD * error, _LEAST_HELD * float(np.ptp(one.compared)))
+        clear.append(abs(held) > least)
+    return 2 * sum(clear) > len(clear)
 
 
 def _command_tells_start(

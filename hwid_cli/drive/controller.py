@@ -59,7 +59,7 @@ def controlled(
     elif p[slots.OUTPUT_IS_VELOCITY] > 0.0:
         error = reference - v
     total = control[ERROR_SUM] + sample_time * error
-    wanted = gain * error + reset * total
+    wanted = gain * error + reset * total + p[slots.START_COMMAND]
     if p[slots.DERIVATIVE_GAIN] != 0.0 and control[HAS_ERROR] > 0.0:
         rate = (error - control[LAST_ERROR]) / sample_time
         wanted += p[slots.DERIVATIVE_GAIN] * rate

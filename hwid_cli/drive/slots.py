@@ -153,5 +153,7 @@ that is switched off is 0, except where the comment says infinite.
     LOOP_RESET,  # rate at which what drives beside the spring is summed up
     GEAR_START,
     OUTPUT_START,
+    START_WARMTH,
+    START_COMMAND,  # what a controller's sum has gathered before
     N_SLOTS,
-) = range(146)
+) = range(148)

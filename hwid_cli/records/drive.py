@@ -184,6 +184,11 @@ class Controller:
                 raise Refused(refusal)
 
     @property
+    def has_sum(self) -> bool:
+        """Whether it holds a command without an error: an integral part."""
+        return self.integral_gain > 0 or self.reset_rate_per_s > 0
+
+    @property
     def at_once_per_position(self) -> float:
         """Command that an error of the position makes at once, [input unit/m]."""
         if self.proportional_gain is not None:

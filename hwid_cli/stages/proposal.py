@@ -38,10 +38,11 @@ _KIND_WORDS = {
     "step": ("step", "sprung", "jump", "schritt", "stufe", "ramp", "rampe"),
 }
 # Recipes of calibration, the best one first; each is tried on the data. A random signal
-# holds stretches that look like a rest: 'cut' alone may go on into the motion.
+# holds stretches that look like a rest: 'cut' alone may go on into the motion. Of a sine it
+# keeps no rest, without which nobody knows how the machine stood.
 _RECIPES: dict[str, tuple[tuple[str, ...], ...]] = {
     "step": (("cut", "output_offset"), ("cut",)),
-    "sine": (("cut",),),
+    "sine": (),
     "random": (),
     "other": (),
 }
@@ -72,6 +73,8 @@ _GOOD_SHARE = 0.05
 # Samples in the time in which the output forgets, beyond which a model of few orders
 # sees nothing change from one to the next, [samples].
 _ENOUGH_SAMPLES = 50
+# An input that exceeds the others by less than this share of their swing goes as far, [-].
+_BEYOND = 0.02
 # One file is cut where each part is still a measurement, [samples].
 _LEAST_TO_CUT = 600
 
@@ -424,15 +427,50 @@ def _held_out(
             "repeat of each input" if are_the_same else "of the inputs that are alike"
         )
         return tuple(one[-1].name for one in families), f"the last {which}"
-    # About a quarter of each kind, neither the first nor the last: often extremes.
+    beyond = _beyond_the_others(raws)
+    inside = [raw for raw in raws if raw.name in free and raw.name not in beyond]
     chosen = [
         name
         for kind in KINDS
-        for number, name in enumerate([n for n in names if kinds[n] == kind])
-        if number % 4 == 2
+        for name in _quarter_by_size(
+            [raw for raw in inside if kinds[raw.name] == kind],
+            sum(kinds[name] == kind for name in names),
+        )
     ]
-    allowed = [name for name in chosen if name in free] or free[-1:] or names[-1:]
-    return tuple(allowed), "about a quarter of each kind, not the first"
+    if chosen:
+        reason = "about a quarter of each kind; none goes beyond what the others reach"
+        return tuple(name for name in names if name in chosen), reason
+    return tuple(free[-1:] or names[-1:]), "the last one"
+
+
+def _beyond_the_others(raws: Sequence[RawRecording]) -> set[str]:
+    """Names of recordings whose input goes where no other one's does.
+
+    A model that is judged there is judged on what it has never seen.
+    """
+    ends = np.array([(np.nanmin(raw.input), np.nanmax(raw.input)) for raw in raws])
+    room = _BEYOND * swing_of([raw.input for raw in raws])
+    found = set()
+    for row, raw in enumerate(raws):
+        others = np.delete(ends, row, axis=0)
+        is_below = ends[row, 0] < others[:, 0].min() - room
+        if is_below or ends[row, 1] > others[:, 1].max() + room:
+            found.add(raw.name)
+    return found
+
+
+def _quarter_by_size(raws: Sequence[RawRecording], of: int) -> list[str]:
+    """Names of a quarter of some recordings, of all sizes, rounded up from three on.
+
+    Parameters
+    ----------
+    of : int
+        Recordings of which they are to be a quarter.
+    """
+    count = min((of + 1) // 4, len(raws))
+    ranked = sorted(raws, key=lambda raw: float(np.nanstd(raw.input)))
+    places = ((2 * n + 1) * len(ranked) // (2 * count) for n in range(count))
+    return [ranked[place].name for place in places]
 
 
 def _is_word_in(name: str, known: Sequence[str]) -> bool:

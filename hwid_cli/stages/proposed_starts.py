@@ -12,8 +12,14 @@ ALIKE_LEVELS = 0.05
 # A level that moves by less than this share of the swing from the first half of a rest to
 # the second stays, [-].
 _STILL = 0.01
+# So much of the swing is no level, [-].
+_NO_LEVEL = 0.01
 _RESTS = (
     "all recordings begin with a rest, so 'steady': nothing is fitted to their starts"
+)
+_AT_ZERO = (
+    "all recordings begin with a rest at zero, so 'zero': nothing is fitted to their "
+    "starts, and noise of the first sample moves nothing"
 )
 _MOVES = "not all recordings begin with a rest, so their starts are fitted"
 _ANYWHERE = "the drive rests anywhere under one input, so starts are fitted"
@@ -116,10 +122,12 @@ def start_of_fits(
     Returns
     -------
     rule, reason : str
-        ``steady`` or ``estimated``.
+        ``zero``, ``steady`` or ``estimated``.
     """
     if is_cut or not _keep_their_rests(raws, recipes):
         return "estimated", _MOVES
+    if _rest_at_zero(raws, recipes, kinds):
+        return "zero", _AT_ZERO
     if not _rest_where_the_input_says(raws, recipes, kinds) or any(
         map(_stays_away, raws)
     ):
@@ -136,9 +144,6 @@ def start_of_diagnosis(
     """How a diagnosis must take the recordings to start, rests cut as proposed."""
     if is_cut or not _keep_their_rests(raws, recipes):
         return "estimated"
-    # 'cut' keeps no rest before a sine: the drive is still where it was before.
-    if "cut" in recipes.get("sine", ()):
-        return "held"
     return "rest"
 
 
@@ -146,8 +151,39 @@ def _keep_their_rests(
     raws: Sequence[RawRecording], recipes: Mapping[str, tuple[str, ...]]
 ) -> bool:
     """Whether no recording may begin in mid-motion after its recipe."""
-    # This leaves a random signal no rest.
-    return recipes.get("random") != ("cut",) and all(map(begins_at_rest, raws))
+    # This leaves a sine and a random signal no rest.
+    loses = "cut" in recipes.get("sine", ()) or recipes.get("random") == ("cut",)
+    return not loses and all(map(begins_at_rest, raws))
+
+
+def _rest_at_zero(
+    raws: Sequence[RawRecording],
+    recipes: Mapping[str, tuple[str, ...]],
+    kinds: Mapping[str, str],
+) -> bool:
+    """Whether all rests are at zero, of the input and of what calibration leaves."""
+    inputs, outputs = _levels(raws, recipes, kinds).T
+    swings = (
+        swing_of([raw.input for raw in raws]),
+        swing_of([raw.output for raw in raws]),
+    )
+    return all(
+        bool(np.max(np.abs(levels)) <= _NO_LEVEL * swing)
+        for levels, swing in zip((inputs, outputs), swings, strict=True)
+    )
+
+
+def _levels(
+    raws: Sequence[RawRecording],
+    recipes: Mapping[str, tuple[str, ...]],
+    kinds: Mapping[str, str],
+) -> np.ndarray:
+    """Levels of input and output at rest, shape (n, 2), once calibration is done."""
+    levels = np.array([_rest_levels(raw) for raw in raws])
+    for row, raw in zip(levels, raws, strict=True):
+        if "output_offset" in recipes.get(kinds[raw.name], ()):
+            row[1] = 0.0
+    return levels
 
 
 def _rest_where_the_input_says(
@@ -156,11 +192,7 @@ def _rest_where_the_input_says(
     kinds: Mapping[str, str],
 ) -> bool:
     """Whether equal levels of the input go with equal levels of the output."""
-    levels = np.array([_rest_levels(raw) for raw in raws])
-    for row, raw in zip(levels, raws, strict=True):
-        if "output_offset" in recipes.get(kinds[raw.name], ()):
-            row[1] = 0.0
-    inputs, outputs = levels.T
+    inputs, outputs = _levels(raws, recipes, kinds).T
     alike = ALIKE_LEVELS * swing_of([raw.input for raw in raws])
     same = np.abs(inputs[:, None] - inputs) <= alike
     apart = np.abs(outputs[:, None] - outputs)

@@ -355,14 +355,16 @@ def without_marks(text):
     )
 
 
-@pytest.mark.parametrize(("rest", "rule"), [(60, "held"), (0, "estimated")])
+@pytest.mark.parametrize(("rest", "rule"), [(60, "rest"), (0, "estimated")])
 def test_the_diagnosis_begins_as_the_recordings_do(folder, tmp_path, rest, rule):
     write_sines(folder, rest=rest)
     out = tmp_path / "mine.yaml"
 
     assert invoke("init", folder, "--out", out).exit_code == 0
     text = out.read_text()
-    assert f"# diagnose: {{max_effects: 2, initial_state: {rule}}}" in text
+    said = "" if rule == "rest" else f", initial_state: {rule}"
+    assert f"# diagnose: {{max_effects: 2{said}}}" in text
+    assert "sine: []" in text
     # As a user does: the marks away.
     start = text.index("# simulation:")
     out.write_text(text[:start] + without_marks(text[start:]))

@@ -411,11 +411,18 @@ def answered(name, current, effects=None):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("is_settled", [False, True])
-def test_the_candidates_of_a_diagnosis_foresee_the_travel(tmp_path, is_settled):
+@pytest.mark.parametrize(
+    ("is_settled", "cut_at"),
+    # Cut in mid-motion: a start that the diagnosis finds, and a further input has none of.
+    [(False, 0), (True, 0), (True, 55)],
+)
+def test_the_candidates_of_a_diagnosis_foresee_the_travel(tmp_path, is_settled, cut_at):
     time = 1e-3 * np.arange(400)
     bump = np.interp(time, [0.04, 0.05, 0.24, 0.25], [0, 1, 1, 0])
     steps = [answered(f"step_{k}", 0.5 * k * bump) for k in (1, 2, 3)]
+    steps[2] = replace(
+        steps[2], input=steps[2].input[cut_at:], output=steps[2].output[cut_at:]
+    )
     for one in steps if is_settled else slow_ramps(4e-4):
         write_recording(tmp_path / "raw", one)
     config = tmp_path / "bench.yaml"

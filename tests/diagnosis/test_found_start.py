@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy
 
-from hwid_cli.diagnosis.diagnose import diagnose
+from hwid_cli import diagnose
 from hwid_cli.diagnosis.found_start import with_found_start
 from hwid_cli.diagnosis.problem import prepare
 from hwid_cli.records.drive import Controller
@@ -207,3 +207,26 @@ def test_a_clean_stage_that_friction_has_left_elsewhere_lacks_nothing():
     )  # fmt: skip
     assert told.verdict == "parameters"
     assert any("start at rest away from their balance" in one for one in told.warnings)
+
+
+@pytest.mark.parametrize("cut_at", [46, 60, 265])
+def test_a_fast_drive_that_moves_at_its_first_sample_tells_it_by_its_fit(cut_at):
+    # 10 Hz at 1 kHz: the speed changes within the samples that would tell it.
+    rng = np.random.default_rng(3)
+    time_s = 1e-3 * np.arange(400)
+    bump = np.interp(time_s, [0.04, 0.05, 0.24, 0.25], [0, 1, 1, 0])
+    plant = scipy.signal.StateSpace(
+        [[0, 1], [-1184 / 0.3, -15 / 0.3]], [[0], [5 / 0.3]], [[1, 0]], [[0]]
+    )
+    recordings = []
+    for number, size in enumerate((0.5, 1.0, 1.5)):
+        first = cut_at if number == 2 else 0
+        _, output, _ = scipy.signal.lsim(plant, size * bump, time_s)
+        output += 2e-5 * rng.standard_normal(400)
+        name = f"step_{number}"
+        recordings.append(
+            Recording(name, size * bump[first:], output[first:], 1e-3, kind="step")
+        )
+    found = diagnose(recordings, simulation(), DiagnoseOptions(effects=(), laws=False))
+    assert found.verdict in ("none", "parameters")
+    assert found.warnings[0].startswith("step_2 starts in motion")

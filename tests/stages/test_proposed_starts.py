@@ -29,8 +29,8 @@ def test_where_all_begin_with_a_rest_nothing_is_fitted_to_starts(offset):
     rule, why = start(
         settled("step_1", 1.0, offset=offset), settled("step_2", -2.0, offset=offset)
     )
-    assert rule == "steady"
-    assert why.startswith("all recordings begin with a rest")
+    assert rule == "zero"
+    assert why.startswith("all recordings begin with a rest at zero")
 
 
 def random_ones(*raws):
@@ -52,15 +52,23 @@ def test_a_drive_that_rests_anywhere_has_fitted_starts():
 
 
 @pytest.mark.parametrize(
-    ("pole", "rule"), [(1.0, "estimated"), (0.95, "steady"), (0.998, "steady")]
+    ("pole", "place", "rule"),
+    [
+        (1.0, 5.0, "estimated"),
+        (0.95, 5.0, "steady"),
+        (0.998, 5.0, "steady"),
+        # From zero nothing drifts, whatever the first sample's noise is.
+        (1.0, 0.0, "zero"),
+        (0.95, 0.0, "zero"),
+    ],
 )
-def test_what_stays_where_it_was_moved_to_has_a_fitted_start(pole, rule):
+def test_what_stays_where_it_was_moved_to_has_a_fitted_start(pole, place, rule):
     u = np.zeros(N)
     u[REST : 2 * REST] = 1.0
     rng = np.random.default_rng(3)
     moved = []
     for name, height in (("prbs_1", 1.0), ("prbs_2", -0.5)):
-        y = lfilter([0.0, 0.1], [1.0, -pole], height * u)
+        y = place + lfilter([0.0, 0.1], [1.0, -pole], height * u)
         y = y + 0.002 * rng.standard_normal(N)
         moved.append(RawRecording(name, height * u, y, 1e-3))
     assert start(*moved)[0] == rule

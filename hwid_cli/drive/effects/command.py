@@ -3,6 +3,7 @@
 docs/method_diagnosis.md, eq. (D4) to (D7).
 """
 
+from dataclasses import replace
 from math import inf, pi
 
 import numpy as np
@@ -349,6 +350,30 @@ THERMAL = Effect(
     },
 )
 
+# Recordings follow each other, and a winding takes minutes to cool.
+THERMAL_WARM = replace(
+    THERMAL,
+    id="thermal_gain_loss:warm",
+    equation="kt -> kt (1 - a w), tau dw/dt = (i / Iref)^2 - w, w = w0 at the start",
+    parameters=(
+        *THERMAL.parameters,
+        Parameter(
+            "start_warmth",
+            lambda scales: (0.0,),
+            lambda scales: (0.0, 2.0),
+            is_positive=False,
+            is_own=True,
+            trials=(0.0, 0.2, 0.5, 1.0),
+            places=("START_WARMTH",),
+            default=0.0,
+            limits=(NOT_NEGATIVE,),
+        ),
+    ),
+    # Where it warms up slowly, each recording has a force constant of its own.
+    contains=("thermal_gain_loss", "parameter_change:force_constant"),
+    is_of_start=True,
+)
+
 VOLTAGE_LIMIT = Effect(
     id="voltage_limit",
     sentence="at speed the back-EMF leaves less current than commanded",
@@ -396,5 +421,6 @@ EFFECTS = (
     SAG,
     RIPPLE,
     THERMAL,
+    THERMAL_WARM,
     VOLTAGE_LIMIT,
 )

@@ -45,6 +45,7 @@ from hwid_cli.drive.motion.quiet import MOST_STEPS, glide_inner, glide_plain
 from hwid_cli.drive.motion.resting import is_anywhere, resting_force, resting_point
 from hwid_cli.drive.motion.state import (
     CIRCUIT,
+    HEAT,
     LAGGED,
     LEVEL,
     MOTOR_V,
@@ -311,6 +312,7 @@ def _start(
         state[X], state[MOTOR_X] = state[X] - ahead, state[MOTOR_X] - ahead
     state[MOTOR_V] = state[V]
     state[PART_X], state[PART_V] = state[X], state[V]
+    memory[HEAT] = p[slots.START_WARMTH]
     memory[SIDE] = np.sign(state[X])
     memory[TURNED_AT] = state[X]
     memory[LEVEL] = bristle_level(state[V], p)

@@ -104,7 +104,8 @@ def resting_force(x: float, current: float, p: np.ndarray) -> float:
     p : ndarray, shape (N_SLOTS,)
     """
     limit = p[slots.CLIP_LIMIT]
-    constant = force_of(min(max(current, -limit), limit), 0.0, p)
+    warmth = p[slots.START_WARMTH]
+    constant = force_of(min(max(current, -limit), limit), warmth, p)
     force = constant
     if p[slots.RIPPLE_SHARE] != 0.0 and p[slots.GEAR_STIFFNESS] > 0.0:
         # The motor turns with its force, and the force with its angle.

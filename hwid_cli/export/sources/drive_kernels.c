@@ -146,7 +146,9 @@ enum {
     LOOP_RESET = 142,
     GEAR_START = 143,
     OUTPUT_START = 144,
-    N_SLOTS = 145,
+    START_WARMTH = 145,
+    START_COMMAND = 146,
+    N_SLOTS = 147,
     CONSTANT = 0,
     VARIABLE = 1,
     ADD = 2,
@@ -1090,7 +1092,7 @@ static double drive_controlled(double reference, double x, double v, double samp
         }
     }
     total = control[ERROR_SUM] + (sample_time * error);
-    wanted = (gain * error) + (reset * total);
+    wanted = ((gain * error) + (reset * total)) + p[START_COMMAND];
     if ((p[DERIVATIVE_GAIN] != 0.0) && (control[HAS_ERROR] > 0.0)) {
         rate = (error - control[LAST_ERROR]) / sample_time;
         wanted += p[DERIVATIVE_GAIN] * rate;
@@ -1737,12 +1739,14 @@ static int drive_is_anywhere(double *p)
 static double drive_resting_force(double x, double current, double *p)
 {
     double limit = 0.0;
+    double warmth = 0.0;
     double constant = 0.0;
     double force = 0.0;
     int _ = 0;
     double turned = 0.0;
     limit = p[CLIP_LIMIT];
-    constant = drive_force_of(least(most(current, -limit), limit), 0.0, p);
+    warmth = p[START_WARMTH];
+    constant = drive_force_of(least(most(current, -limit), limit), warmth, p);
     force = constant;
     if ((p[RIPPLE_SHARE] != 0.0) && (p[GEAR_STIFFNESS] > 0.0)) {
         for (_ = 0; _ < MOST_TURNS; ++_) {
@@ -3787,6 +3791,7 @@ static double drive_start(double *state, double *memory, double command, double 
     state[MOTOR_V] = state[V];
     state[PART_X] = state[X];
     state[PART_V] = state[V];
+    memory[HEAT] = p[START_WARMTH];
     memory[SIDE] = sign_of(state[X]);
     memory[TURNED_AT] = state[X];
     memory[LEVEL] = drive_bristle_level(state[V], p);
