@@ -25,6 +25,7 @@ from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import Calibrated
 from hwid_cli.report.check import check_document, recordings_table, stages_table
 from hwid_cli.report.table import as_text
+from hwid_cli.stages.crossval import loose_threshold
 from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_fits
 from hwid_cli.stages.identify import recordings_with_models, stored_fits
 from hwid_cli.stages.joint_seconds import time_joint_fits
@@ -32,7 +33,7 @@ from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.recording_facts import Checked, check_recordings
 from hwid_cli.stages.run_seconds import page_plan, with_start
 from hwid_cli.stages.selection import named_recordings
-from hwid_cli.stages.simulation_units import refused_units
+from hwid_cli.stages.simulation_units import overruled_units, refused_units
 from hwid_cli.stages.stage import Context, Planning
 from hwid_cli.stages.table import named, needed, none_named, stage_named, to_run
 from hwid_cli.store.cache import Hdf5Store
@@ -151,6 +152,10 @@ def _show_warnings(experiment: Experiment, checked: Checked, out: Path) -> None:
         # Their results are all that is there.
         if {*needed(name, experiment)} - {"simulate"} == {"calibrate"}:
             said += stage.warnings(context, stage.choose(context))
+    source = str(experiment.source)
+    said += overruled_units(source, checked.logs)
+    if experiment.crossval is not None:
+        said += loose_threshold(experiment.crossval, checked.recordings, source)
     said += [fault] if (fault := none_named(experiment)) else []
     for warning in dict.fromkeys(said):
         click.echo(f"hwid: {warning}", err=True)

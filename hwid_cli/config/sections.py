@@ -347,6 +347,10 @@ def _step(kind: str, value: Any) -> str:
 
 
 def _unknown_key(place: tuple[Any, ...], record_type: Any, content: Any) -> Fault:
+    if isinstance(place[-1], int):
+        # What {threshold: 0,7} is to YAML.
+        step = "with a decimal comma? Write a point, as in 0.7 for 0,7"
+        return Fault(place, "unknown key", step=step)
     elsewhere = [
         repr(f"{section}.{place[-1]}")
         for section, keys in _sections(record_type).items()

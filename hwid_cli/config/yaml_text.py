@@ -18,6 +18,8 @@ from hwid_cli.files.small_files import read_small_file
 
 # What a file may hold in place of sections.
 _CONTENTS = {type(None): "nothing", str: "text", int: "a number", float: "a number"}
+# As the loader writes the letter that it cannot take.
+_TAB = repr("\t")
 _EXPONENT_WITHOUT_POINT = re.compile(r"^[-+]?(?:\d+\.?\d*|\.\d+)[eE][-+]?\d+$")
 
 
@@ -101,6 +103,11 @@ def read_yaml(path: Path) -> dict[Any, Any]:
             f"{path}: no such file; expected a YAML file that describes an experiment; "
             "check the path"
         ) from None
+    except IsADirectoryError:
+        raise ConfigError(
+            f"{path}: is a folder; expected a YAML file that describes an experiment; "
+            f"'hwid init {path}' writes one for the measurements in it"
+        ) from None
     except (OSError, UnicodeDecodeError) as error:
         said = getattr(error, "strerror", None) or error
         raise ConfigError(
@@ -156,6 +163,11 @@ def _one_line(path: Path, error: yaml.YAMLError) -> str:
     row = f"{path}, line {mark.line + 1}: {said}"
     if "given twice" in said:
         return row
+    if _TAB in said:
+        return (
+            f"{path}, line {mark.line + 1}: begins with a tab; expected blanks, which "
+            "are all that YAML indents with; replace the tabs"
+        )
     return (
         f"{row}; expected valid YAML; check quotes, brackets and indentation near "
         f"column {mark.column + 1}"

@@ -30,7 +30,7 @@ from hwid_cli.data.conditions import condition_notes
 from hwid_cli.data.formats import SUFFIXES, has_reader, list_columns, reader_of
 from hwid_cli.data.header_stamps import topic_of
 from hwid_cli.data.packed import stem_of
-from hwid_cli.data.recording_files import PLAN_NAME
+from hwid_cli.data.recording_files import PLAN_NAME, SYSTEM_NAMES
 from hwid_cli.data.sampling import missing_samples
 from hwid_cli.data.split_files import split_recordings
 from hwid_cli.data.units import factor_between
@@ -46,8 +46,6 @@ _MOST_ASKED = 7
 # Stands for every table of a file, and how deep these may lie.
 STAR = "*"
 _DEEPEST_TABLE = 3
-# What spreadsheets and systems leave beside data.
-_SYSTEM_NAMES = ("~$", "._", "Thumbs", "desktop")
 
 
 def list_measurements(folder: Path) -> tuple[FoundFile, ...]:
@@ -94,7 +92,7 @@ def _candidates(folder: Path, pattern: str) -> list[Path]:
         path
         for path in folder.glob(pattern)
         if path.name != PLAN_NAME
-        and not path.name.startswith(_SYSTEM_NAMES)
+        and not path.name.startswith(SYSTEM_NAMES)
         and not any(part.startswith(".") for part in path.relative_to(folder).parts)
         and path.is_file()
     )

@@ -24,6 +24,8 @@ from hwid_cli.records.experiment import Experiment, RecordingsOptions
 from hwid_cli.records.recordings import KINDS
 
 PLAN_NAME = "plan.csv"
+# How files begin that systems and office programs, while a table is open, put beside others.
+SYSTEM_NAMES = ("~$", "._", "Thumbs", "desktop")
 _OTHER = "other"
 REAL_DATA_VARIABLE = "HWID_REALDATA"
 # Of a path in a message.
@@ -113,6 +115,8 @@ def missing_files_message(experiment: Experiment, base: Path) -> str:
             f"put the data there, or set {REAL_DATA_VARIABLE} to the folder that "
             "holds them"
         )
+    elif "\\" in pattern and os.sep == "/":
+        step = "write / in place of \\, and the folder as this machine names it"
     else:
         step = "put the files there or correct recordings.files"
     return (
@@ -146,7 +150,12 @@ def _matches(pattern: str, experiment: Experiment, base: Path) -> list[Path]:
     if not found and _is_file(base / plain):
         found = [plain]
     paths = [base / match for match in found]
-    return [_short(path) for path in paths if _is_file(path) and path.name != PLAN_NAME]
+    return [_short(path) for path in paths if _is_file(path) and not _is_beside(path)]
+
+
+def _is_beside(path: Path) -> bool:
+    """Whether a file is the plan, or one that a system has put there."""
+    return path.name == PLAN_NAME or path.name.startswith(SYSTEM_NAMES)
 
 
 def _is_file(path: Path) -> bool:

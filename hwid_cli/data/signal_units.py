@@ -38,6 +38,8 @@ from hwid_cli.records.programs import ForeignSimulation
 from hwid_cli.records.recordings import CalibrationLog, SignalUnit
 
 _DAY_S = 86_400.0
+# Units that differ by less are one, [-].
+_SAME_FACTOR = 1e-9
 # Of recordings where nothing says more.
 _USUAL = {"input": "A", "output": "m"}
 
@@ -115,10 +117,23 @@ def signal_unit(
     MeasurementError
         If the file and ``recordings.units`` name units of different quantities.
     """
-    options, simulation = experiment.recordings, experiment.simulation
+    options = experiment.recordings
     if options is None:
         raise ValueError("an experiment without recordings has no signals")
     _refuse_other_quantity(column, role, experiment.source, options)
+    found = _signal_unit(column, role, experiment)
+    scale = factor_between(column.unit, found.given) if column.unit else None
+    is_other = scale is not None and abs(scale - 1.0) > _SAME_FACTOR
+    return replace(found, overruled=column.unit) if is_other else found
+
+
+def _signal_unit(
+    column: MeasuredColumn, role: str, experiment: Experiment
+) -> SignalUnit:
+    """The same, whatever the file says beside."""
+    options, simulation = experiment.recordings, experiment.simulation
+    if options is None:
+        raise ValueError("an experiment without recordings has no signals")
     label = getattr(options, f"{role}_unit")
     given, said_by = _given(column, role, options)
     stated = getattr(options.units, role)

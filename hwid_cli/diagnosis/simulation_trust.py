@@ -115,10 +115,17 @@ def _rms_of(train: Sequence[Compared]) -> float:
 def _as_unseen(
     problem: DiagnosisProblem, fit_layout: ParameterLayout, point: ParameterPoint
 ) -> ParameterPoint:
-    """The same with own values of held-out recordings that nobody can know: usual ones."""
+    """The same with own values of held-out recordings that nobody can know: usual ones.
+
+    A place at rest is read at the start: fitted, it would take a part of what comes later
+    off, the drift of an axis.
+    """
     is_held = np.array([one.is_held_out for one in problem.signals])
     own = point.own.copy()
     for column, one in enumerate(fit_layout.own):
+        if one.owner == START and one.name == "position" and problem.start == "rest":
+            rests = [one.coordinate(each.rest_position_m) for each in problem.signals]
+            own[is_held, column] = np.array(rests)[is_held]
         if one.owner == START or not is_held.any():
             continue
         # An exported simulation has the mean of the factors, and no phase.

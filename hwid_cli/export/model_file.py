@@ -103,6 +103,11 @@ def _read_json(path: Path) -> dict[str, Any]:
             f"{path}: cannot be read ({error.strerror or error}); {wanted}' wrote"
         ) from error
     except (ValueError, RecursionError) as error:
+        if path.suffix.lower() in (".yaml", ".yml"):
+            raise ModelFileError(
+                f"{path}: is a configuration; expected a model; 'hwid export {path}' "
+                "writes those of its results"
+            ) from error
         said = " ".join(str(error).split())[:120]
         raise ModelFileError(
             f"{path}: is no JSON ({said}); {wanted} --format json' wrote; export it again"

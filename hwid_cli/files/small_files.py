@@ -22,10 +22,9 @@ def read_small_file(path: Path, *, most_bytes: int = MOST_TEXT_BYTES) -> bytes:
     """
     # Before it is opened: that would wait for somebody to write into a pipe.
     if not stat.S_ISREG(path.stat().st_mode):
-        is_folder = path.is_dir()
-        raise OSError(
-            errno.EINVAL, "Is a directory" if is_folder else "Is no plain file"
-        )
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, "Is a directory")
+        raise OSError(errno.EINVAL, "Is no plain file")
     with path.open("rb") as file:
         content = file.read(most_bytes + 1)
     if len(content) > most_bytes:

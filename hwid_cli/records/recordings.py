@@ -53,6 +53,8 @@ class SignalUnit:
         Unit of the recording's numbers.
     factor : float, [unit/given]
         1 where nothing was converted.
+    overruled : str
+        What the file says instead; empty where it says the same, or nothing.
     """
 
     role: str
@@ -60,6 +62,7 @@ class SignalUnit:
     said_by: str
     unit: str
     factor: float = 1.0
+    overruled: str = field(default="", metadata=ADDED_LATER)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

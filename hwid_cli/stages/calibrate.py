@@ -38,6 +38,7 @@ from hwid_cli.report.sections.calibrate import drawings_of
 from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.proposed_starts import levels_taken_off
 from hwid_cli.stages.selection import named_recordings, select_recordings
+from hwid_cli.stages.simulation_units import overruled_units
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
 from hwid_cli.store.result_files import Provenance
 from hwid_cli.store.results import read_calibrated, write_calibrated
@@ -295,6 +296,7 @@ def _warnings(context: Context, given: Measured) -> list[str]:
         for name, several in doubts(given.recordings).items()
         for doubt in several
     ]
+    said += overruled_units(source, given.recordings)
     if given.options is None:
         return said
     recipes = {one.kind: getattr(given.options, one.kind) for one in given.recordings}

@@ -21,6 +21,7 @@ from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import RmsdMatrix
 from hwid_cli.records.results import CrossValidation, ModelScore
 from hwid_cli.records.trust import TrustOnTests
+from hwid_cli.records.units import behind
 from hwid_cli.report.crossval import coverage_table, cross_table
 from hwid_cli.report.table import Block
 from hwid_cli.stages.fit_seconds import (
@@ -377,6 +378,20 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
     return (StagePlan(NAME, what, pairs, done, seconds, size, is_shared=True),)
 
 
+def loose_threshold(
+    options: CrossvalOptions, recordings: Sequence[Recording], source: str
+) -> list[str]:
+    """Say that every model is below a threshold, as one of another unit is."""
+    swing = float(np.median([np.ptp(one.output) for one in recordings]))
+    if not options.threshold > swing > 0.0:
+        return []
+    unit = behind(recordings[0].output_unit)
+    return [
+        f"{source}: crossval.threshold: found {options.threshold:g}{unit}; expected a "
+        f"part of what the output moves by, {swing:.3g}{unit}: any model is below it"
+    ]
+
+
 STAGE = Stage(
     name=NAME,
     needs=("calibrate", "identify"),
@@ -392,6 +407,9 @@ STAGE = Stage(
     summary=_summary,
     write_files=_write_csv,
     tables=_tables,
+    warnings=lambda context, given: loose_threshold(
+        given.options, given.recordings, str(context.experiment.source)
+    ),
     shows_before=("identify",),
     files=("results.h5", "crossval.csv", "coverage.csv", "crossval_trust.csv"),
     plan=_plan,

@@ -21,7 +21,12 @@ from hwid_cli.records.experiment import (
     RecordingsOptions,
     SimulationOptions,
 )
-from hwid_cli.records.recordings import CalibrationLog, Recording, SignalUnit
+from hwid_cli.records.recordings import (
+    CalibrationLog,
+    RawRecording,
+    Recording,
+    SignalUnit,
+)
 
 # Units of a recording of which a program says none.
 _USUAL = {"input": "A", "output": "m"}
@@ -425,3 +430,25 @@ def _misfit(compared: Sequence[Compared]) -> float:
     """Median share of what was measured that the simulation leaves."""
     left = [one.rms / max(_swing(one.signals.compared), 1e-300) for one in compared]
     return float(np.median(left)) if left else float("inf")
+
+
+def overruled_units(
+    source: str, read: Sequence[RawRecording | CalibrationLog]
+) -> list[str]:
+    """Units of a configuration that files contradict: a factor that nobody sees later.
+
+    Parameters
+    ----------
+    source : str
+        Of the configuration.
+    read : sequence of RawRecording or CalibrationLog
+        Of one of them for each signal a line.
+    """
+    units = {one.role: (each, one) for each in read for one in each.units}
+    return [
+        f"{source}: {one.said_by}: found {one.given!r}, but the file of {each.name} says "
+        f"{one.overruled!r}; expected the same; {one.given!r} counts: correct it, unless "
+        "the file is wrong"
+        for each, one in units.values()
+        if one.overruled
+    ]

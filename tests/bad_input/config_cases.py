@@ -44,7 +44,12 @@ def _case(name, make, *says):
 
 
 SYNTAX = [
-    _case("tabs", text("name: tiny\nrecordings:\n\tfiles: x\n"), "line 3", "'\\t'"),
+    _case(
+        "tabs",
+        text("name: tiny\nrecordings:\n\tfiles: x\n"),
+        "line 3",
+        "replace the tabs",
+    ),
     _case(
         "a key twice", more("name: again"), "line 6", "twice, first in line 1", "keep"
     ),
@@ -75,7 +80,7 @@ SYNTAX = [
     _case("Latin-1", text("name: kräft\n".encode("latin-1")), "UTF-8", "0xe4"),
     _case("UTF-16", text(CONFIG.encode("utf-16")), "UTF-8", "0xff"),
     _case("300 kB", text("#" * 300_000 + f"\n{CONFIG}"), "larger than 256 kB"),
-    _case("folder", _instead(lambda path: path.mkdir()), "Is a directory"),
+    _case("folder", _instead(lambda path: path.mkdir()), "is a folder"),
     _case("missing", _instead(lambda path: None), "no such file", "check the path"),
     _case("link to itself", _instead(lambda path: path.symlink_to(_FILE)), "Too many"),
     _case("pipe", _instead(os.mkfifo), "no plain file"),
