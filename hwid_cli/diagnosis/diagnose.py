@@ -190,10 +190,15 @@ def _held_or_not(
     given_sse: np.ndarray | None,
 ) -> "_Searched":
     """What is found beside a command in straight lines, or beside a held one."""
-    searched = _searched(problem, options, run_tasks, on_round, given_sse)
+    on_round("base", 0)
+    fitted, held = _begun(problem, options), None
+    if problem.may_be_held and not _lacks_nothing(fitted):
+        held = _begun(with_held_command(problem), options)
+        if _lacks_nothing(held):
+            return _searched(held, options, run_tasks, on_round, given_sse)
+    searched = _searched(fitted, options, run_tasks, on_round, given_sse)
     rounds, found = searched.rounds, searched.found
-    if problem.may_be_held and searched.has_gap and is_held(rounds, found):
-        held = with_held_command(problem)
+    if held is not None and searched.has_gap and is_held(rounds, found):
         again = _searched(held, options, run_tasks, on_round, given_sse)
         best = best_of(again.rounds, again.found)
         if does_as_well(rounds, best, best_of(rounds, found)):
@@ -335,18 +340,28 @@ class _Searched:
         return best if best is not None and criteria.gain(best, base) > 0 else None
 
 
+def _begun(problem: DiagnosisProblem, options: DiagnoseOptions) -> FittedBase:
+    """The base fitted again, from where recordings start."""
+    fitted = _from_found_start(fitted_base(problem), problem)
+    if isinstance(options.hold_out, str):
+        fitted = _with_odd_ones_trained(fitted)
+    return fitted
+
+
+def _lacks_nothing(fitted: FittedBase) -> bool:
+    """Whether a base leaves nothing but noise, or what measuring alone explains."""
+    criteria = SelectionCriteria.of(fitted.problem, fitted.noise)
+    return fitted.base.is_usable and criteria.needs_nothing(fitted.base)
+
+
 def _searched(
-    problem: DiagnosisProblem,
+    fitted: FittedBase,
     options: DiagnoseOptions,
     run_tasks: RunTasks,
     on_round: OnRound,
     given_sse: np.ndarray | None,
 ) -> _Searched:
-    """Fit the base again, and search for sets of effects."""
-    on_round("base", 0)
-    fitted = _from_found_start(fitted_base(problem), problem)
-    if isinstance(options.hold_out, str):
-        fitted = _with_odd_ones_trained(fitted)
+    """Search for sets of effects."""
     searched = _beside(fitted, options, run_tasks, on_round, given_sse)
     better = _better_base(fitted, searched)
     if better is not None:
@@ -368,14 +383,14 @@ def _from_found_start(fitted: FittedBase, problem: DiagnosisProblem) -> FittedBa
 
     Zeros of the sensor that differ are no places of the machine.
     """
-    criteria = SelectionCriteria.of(fitted.problem, fitted.noise)
-    if fitted.base.is_usable and criteria.needs_nothing(fitted.base):
+    if _lacks_nothing(fitted):
         return fitted
     found = with_found_start(problem)
     if found is not problem:
         fitted = fitted_base(found)
-    if found.start == "estimated" or criteria.needs_nothing(fitted.base):
+    if found.start == "estimated" or _lacks_nothing(fitted):
         return fitted
+    criteria = SelectionCriteria.of(fitted.problem, fitted.noise)
     return started_in_motion(problem, criteria, fitted.base) or fitted
 
 
@@ -432,9 +447,9 @@ def _beside(
 
 def _with_odd_ones_trained(fitted: FittedBase) -> FittedBase:
     """The base fitted again where the few recordings that hold the gap were held out."""
-    criteria = SelectionCriteria.of(fitted.problem, fitted.noise)
-    if not fitted.base.is_usable or criteria.needs_nothing(fitted.base):
+    if not fitted.base.is_usable or _lacks_nothing(fitted):
         return fitted
+    criteria = SelectionCriteria.of(fitted.problem, fitted.noise)
     excess = np.maximum(fitted.base.sse - criteria.floors, 0.0)
     problem = with_odd_ones_trained(fitted.problem, excess)
     return fitted if problem is fitted.problem else fitted_base(problem)

@@ -10,12 +10,13 @@ from dataclasses import replace
 import numpy as np
 
 from hwid_cli.diagnosis.base_fit import FittedBase, compared_as_given, fitted_base
+from hwid_cli.diagnosis.candidate import base_of, fitted_drive
 from hwid_cli.diagnosis.noise import noise_floor
 from hwid_cli.diagnosis.problem import DiagnosisProblem, Signals
 from hwid_cli.diagnosis.rests import rest_length
 from hwid_cli.diagnosis.selection import SelectionCriteria
 from hwid_cli.records.candidates import CandidateFit
-from hwid_cli.records.drive import StandIn
+from hwid_cli.records.drive import Drive, StandIn
 
 # What is seen in first samples has to be so many times its error.
 _CLEARLY = 5.0
@@ -34,6 +35,8 @@ _SAME = 0.3
 _FEW = 16
 # What is left once all starts are fitted, over what is left from rest, at most, [-].
 _LEFT_BY_STARTS = 0.1
+# By so much a base may be off, [-].
+_MOVED = 3.0
 # At most this share of a recording is its beginning, [-].
 _BEGINNING = 0.1
 
@@ -80,6 +83,11 @@ def started_in_motion(
     most = _LEFT_BY_STARTS * criteria.excess(base)
     if not free.base.is_usable or criteria.excess(free.base) > most:
         return None
+    if any(
+        not 1 / _MOVED <= one <= _MOVED for one in _factors(problem.drive, free.base)
+    ):
+        # A base that is another drive imitates what is missing.
+        return None
     speed = [one.parameter for one in free.base.own_names].index("velocity")
     speeds = np.abs(free.base.own[:, speed])
     moving = tuple(
@@ -89,6 +97,12 @@ def started_in_motion(
     )
     found = replace(free.problem, start_told_by=moving)
     return replace(free, problem=found) if moving else None
+
+
+def _factors(drive: Drive, base: CandidateFit) -> list[float]:
+    """By which a fit has moved the parameters that a drive states."""
+    stated, fitted = base_of(drive), base_of(fitted_drive(drive, base))
+    return [fitted[name] / value for name, value in stated.items() if value != 0]
 
 
 def _may_start_elsewhere(problem: DiagnosisProblem) -> bool:

@@ -116,7 +116,12 @@ def _residuals_with(
         one.coordinate(known[one.ref] if one.ref in known else given[one.name])
         for one in wider.shared
     ]
-    return residuals_at(problem, wider, ParameterPoint(np.array(shared), point.own))
+    # A lag has a start of its own, where starts are fitted.
+    had = {one.ref: point.own[:, column] for column, one in enumerate(fit_layout.own)}
+    nothing = np.zeros(len(problem.signals))
+    own = [had.get(one.ref, nothing) for one in wider.own]
+    stacked = np.column_stack(own) if own else point.own
+    return residuals_at(problem, wider, ParameterPoint(np.array(shared), stacked))
 
 
 def _unabsorbed(

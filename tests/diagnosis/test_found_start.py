@@ -17,7 +17,7 @@ from tests.blind.cases import make_case
 from tests.blind.machine import SAMPLE_TIME_S
 from tests.blind.nuisances import NUISANCES
 from tests.cli.drive_examples import NOISE, STEP_S, currents, displacement
-from tests.diagnosis.small_drive import in_turn, simulation
+from tests.diagnosis.small_drive import simulation
 
 REST = DiagnoseOptions()
 LEAD_IN = 100
@@ -202,9 +202,8 @@ def test_rests_at_several_levels_of_the_input_tell_parameters_and_no_start():
 def test_a_clean_stage_that_friction_has_left_elsewhere_lacks_nothing():
     recordings = held_by_friction((3e-4, 1e-4, -2.5e-4, 0.0), fine=200)
     told = diagnose(
-        recordings, stage(hold="zero"), DiagnoseOptions(effects=("spring_preload",)),
-        in_turn, lambda *_: None,
-    )  # fmt: skip
+        recordings, stage(hold="zero"), DiagnoseOptions(effects=("spring_preload",))
+    )
     assert told.verdict == "parameters"
     assert any("start at rest away from their balance" in one for one in told.warnings)
 
