@@ -390,8 +390,7 @@ def _from_found_start(fitted: FittedBase, problem: DiagnosisProblem) -> FittedBa
         fitted = fitted_base(found)
     if found.start == "estimated" or _lacks_nothing(fitted):
         return fitted
-    criteria = SelectionCriteria.of(fitted.problem, fitted.noise)
-    return started_in_motion(problem, criteria, fitted.base) or fitted
+    return started_in_motion(problem, fitted.base) or fitted
 
 
 def _better_base(fitted: FittedBase, searched: _Searched) -> FittedBase | None:

@@ -33,8 +33,8 @@ _SAME = 0.3
 # Of a rest before the input moves so many count: of one that follows a step of it, those
 # in which a drive has not answered yet, [samples].
 _FEW = 16
-# What is left once all starts are fitted, over what is left from rest, at most, [-].
-_LEFT_BY_STARTS = 0.1
+# What a recording leaves once its start is fitted, over what it leaves from rest, at most, [-].
+_LEFT_BY_START = 0.1
 # By so much a base may be off, [-].
 _MOVED = 3.0
 # At most this share of a recording is its beginning, [-].
@@ -64,9 +64,9 @@ def with_found_start(problem: DiagnosisProblem) -> DiagnosisProblem:
 
 
 def started_in_motion(
-    problem: DiagnosisProblem, criteria: SelectionCriteria, base: CandidateFit
+    problem: DiagnosisProblem, base: CandidateFit
 ) -> FittedBase | None:
-    """Base with all starts fitted, where these are nearly all that was missing.
+    """Base with all starts fitted, where these are nearly all that a recording lacked.
 
     Of a fast drive few samples tell a speed, and its first ones are no parabola.
 
@@ -80,29 +80,29 @@ def started_in_motion(
     if not _may_start_elsewhere(problem):
         return None
     free = fitted_base(replace(problem, start="estimated"))
-    most = _LEFT_BY_STARTS * criteria.excess(base)
-    if not free.base.is_usable or criteria.excess(free.base) > most:
+    factors = _factors(problem.drive, free.base)
+    # A base that is another drive imitates what is missing.
+    if not free.base.is_usable or max(factors) > _MOVED or min(factors) < 1 / _MOVED:
         return None
-    if any(
-        not 1 / _MOVED <= one <= _MOVED for one in _factors(problem.drive, free.base)
-    ):
-        # A base that is another drive imitates what is missing.
-        return None
+    floors = SelectionCriteria.of(free.problem, free.noise).floors
+    before, after = base.sse - floors, free.base.sse - floors
     speed = [one.parameter for one in free.base.own_names].index("velocity")
-    speeds = np.abs(free.base.own[:, speed])
+    largest = np.array([_largest_speed(one) for one in problem.signals])
+    is_moving = np.abs(free.base.own[:, speed]) > _LEAST_SPEED * largest
+    is_told = (before > floors) & (after <= _LEFT_BY_START * before)
     moving = tuple(
         one.name
-        for one, first in zip(problem.signals, speeds, strict=True)
-        if first > _LEAST_SPEED * _largest_speed(one)
+        for one, is_one in zip(problem.signals, is_moving & is_told, strict=True)
+        if is_one
     )
     found = replace(free.problem, start_told_by=moving)
     return replace(free, problem=found) if moving else None
 
 
 def _factors(drive: Drive, base: CandidateFit) -> list[float]:
-    """By which a fit has moved the parameters that a drive states."""
+    """By which a fit has moved the parameters that a drive states; 1 for those of 0."""
     stated, fitted = base_of(drive), base_of(fitted_drive(drive, base))
-    return [fitted[name] / value for name, value in stated.items() if value != 0]
+    return [fitted[name] / one if one else 1.0 for name, one in stated.items()]
 
 
 def _may_start_elsewhere(problem: DiagnosisProblem) -> bool:
