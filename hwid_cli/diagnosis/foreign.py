@@ -44,7 +44,7 @@ from hwid_cli.diagnosis.untold import (
     with_interval,
     without_forces_told,
 )
-from hwid_cli.records.diagnosis import BaseParameter, Diagnosis
+from hwid_cli.records.diagnosis import STILL_LARGE, BaseParameter, Diagnosis
 from hwid_cli.records.drive import StandIn
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import SimulatorRun, StandInChange
@@ -60,6 +60,10 @@ _BESIDE_PARAMETERS = (
     "with displacement, velocity and input act beside them, as factors under "
     "simulation.stand_in in extended_simulation.yaml"
 )
+# A parameter is at a bound within this share of its stated value, [-].
+_AT_BOUND = 1e-3
+# Values of a simulation's parameters, and what it gives with them.
+_Start = tuple[dict[str, float], Sequence[SimulatorRun]]
 
 
 def diagnose_foreign(
@@ -92,7 +96,11 @@ def diagnose_foreign(
         on_round("its parameters", 0)
         begun, given, refitted = _refitted(begun, refitted)
     runs = begun.runs
-    search = _searched(begun, given, refitted, options, on_round)
+    stated = dict(simulator.values)
+    starts: tuple[_Start, _Start] = (refitted, given), (stated, begun.given)
+    if _is_at_its_bounds(begun, given, refitted):
+        starts = (starts[1], starts[0])
+    search = _searched(begun, starts, options, on_round)
     found, values = search.findings, search.values
     if search.is_confirmed and not is_all_but_nothing(found):
         law = law_instead(
@@ -134,6 +142,25 @@ def _fitted_to(
     return values, runs.of(signals, values)
 
 
+def _is_at_its_bounds(
+    begun: Begun, given: Sequence[SimulatorRun], values: Mapping[str, float]
+) -> bool:
+    """Whether a re-fit has led a parameter to a bound, and much is left there.
+
+    It has imitated what is missing then, as far as it may: a weight by a tenth of the
+    input's gain.
+    """
+    problem, free = begun.problem, begun.runs.simulator.free
+    left = float(_sse(problem.signals, given).sum())
+    most = STILL_LARGE**2 * problem.n_evaluated * noise_floor(problem).rms ** 2
+    at_bounds = any(
+        abs(values[name] - bound) <= _AT_BOUND * abs(one.value)
+        for name, one in free.items()
+        for bound in one.limits
+    )
+    return left > most and at_bounds
+
+
 def _said_of_runs(counted: CountedRuns, found: Findings) -> tuple[str, ...]:
     """Say that the limit of runs has ended the search, where something is left."""
     if not counted.are_spent:
@@ -150,8 +177,7 @@ def _said_of_runs(counted: CountedRuns, found: Findings) -> tuple[str, ...]:
 
 def _searched(
     begun: Begun,
-    given: Sequence[SimulatorRun],
-    values: dict[str, float],
+    starts: tuple[_Start, _Start],
     options: DiagnoseOptions,
     on_round: OnRound,
 ) -> FoundBeside:
@@ -159,9 +185,11 @@ def _searched(
 
     Parameters
     ----------
-    given : sequence of SimulatorRun
-        What the simulation gives with these values of its parameters.
+    starts : tuple
+        Values of its parameters to begin with, and those for where nothing holds beside
+        these, each with what the simulation gives with them.
     """
+    (values, given), (others, _) = starts
     problem, runs = begun.problem, begun.runs
     simulator = runs.simulator
     # With effects of its own the stand-in says what the whole simulation leaves, and the
@@ -185,9 +213,9 @@ def _searched(
         if runs.run_tasks.are_spent or (count and has_few_runs(runs)):
             break
         # Parameters that imitated what is missing have led elsewhere; or to where nothing
-        # holds in the simulation: the given ones have imitated nothing yet.
+        # holds in the simulation.
         is_in_vain = count == MOST_SEARCHES - 2 and not this.is_confirmed
-        following = dict(simulator.values) if is_in_vain else moved
+        following = dict(others) if is_in_vain else moved
         if not have_moved(values, following, MOVED):
             break
         values = following

@@ -319,13 +319,15 @@ def error_of(
         for one, there in zip(signals, moved, strict=True)
     ]
     bend = _bend_along(moved, forces)
+    # A level that they have in common, such as a room's temperature, bends nothing.
+    level = float(np.mean(np.concatenate(forces)))
     total = 0.0
     for one, there, force in zip(signals, moved, forces, strict=True):
         as_run = one.seen(moved_plainly(drive, one, force, there))
         more = bend(one.position) - bend(there.position)
         bent = one.seen(moved_plainly(drive, one, force + more, there)) - as_run
         total += float(np.sum(bent[one.evaluated] ** 2))
-        plain = one.seen(moved_plainly(drive, one, 0.0 * force, there))
+        plain = one.seen(moved_plainly(drive, one, 0.0 * force + level, there))
         shown = one.seen(there)
         size = float(np.sum((shown - shown[0]) ** 2))
         share = float(np.sum((shown - plain) ** 2)) / size if size > 0 else 0.0

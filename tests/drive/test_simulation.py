@@ -456,3 +456,31 @@ def test_a_force_beside_the_input_does_not_pass_the_command():
             nothing, parameter_vector(drive, effects), SAMPLE_TIME_S, force=force
         )
         assert rms(found.output - plain.output) < ROUNDING_M, effects
+
+
+def test_a_drive_that_runs_away_between_teeth_ends():
+    # A stop throws it to where a softening spring drives it on, to infinity in 0.3 s: no
+    # step that leads there is long enough.
+    drive = Drive(
+        mass_kg=0.036,
+        damping_N_s_per_m=0.0639,
+        stiffness_N_per_m=1.08,
+        force_constant_N_per_A=0.289,
+        effects={
+            "gear_backlash": {
+                "half_gap_m": 0.0441,
+                "stiffness_N_per_m": 3551.0,
+                "motor_share": 0.7357,
+                "motor_damping_share": 0.7767,
+                "contact_damping_ratio": 0.107,
+            },
+            "one_sided_stop": {"position_m": -0.4743, "stiffness_N_per_m": 142.8},
+            "cubic_stiffness": {"stiffness_N_per_m3": -0.1688},
+        },
+    )
+    found = simulate_drive(
+        np.zeros(117), drive, sample_time_s=0.005, start=(-1.1355, -1.2676)
+    )
+    away = np.isnan(found.position)
+    assert 50 < np.argmax(away) < 90
+    assert away[np.argmax(away) :].all()

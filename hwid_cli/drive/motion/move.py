@@ -68,6 +68,8 @@ HALVINGS = 6
 MANY_PIECES = 1000
 # Most events in one piece; what rattles more often is followed less exactly.
 MOST_EVENTS = 100
+# Beyond this a drive has run away, [m].
+FAR_AWAY = 1e60
 # A preload catches a drive at 0 that it would stop within this share of a sample.
 CAPTURE_SHARE = 0.02
 
@@ -88,7 +90,8 @@ def move(
     """
     n = command.size
     p = given_p.copy()
-    positions, velocities, given = np.empty(n), np.empty(n), command.copy()
+    positions, velocities = np.full(n, np.nan), np.full(n, np.nan)
+    given = command.copy()
     has_controller, control = is_closed(p), np.zeros(N_CONTROL)
     is_reset, summed = p[slots.LOOP_RESET] > 0.0, 0.0
     if is_reset:
@@ -132,7 +135,8 @@ def move(
             pushes, room, memory, p,
         )  # fmt: skip
         j: int = np.int64(0)  # type: ignore[assignment]
-        while j < count:
+        # A drive that has run away stays there: nothing bounds its steps any more.
+        while j < count and np.abs(state[X]) < FAR_AWAY:
             push, length, done = pushes[j], pieces[j, LENGTH], 0.0
             if kind[0]:
                 done = glide_inner(
@@ -155,7 +159,7 @@ def move(
             if at >= 0:
                 positions[at], velocities[at] = state[seen], state[seen + 1]
             j += 1
-        if count == 0:
+        if count == 0 or not np.abs(state[X]) < FAR_AWAY:
             break
     _blank(positions, velocities, given)
     return positions, velocities, given
