@@ -47,7 +47,7 @@ from hwid_cli.diagnosis.untold import (
 from hwid_cli.records.diagnosis import STILL_LARGE, BaseParameter, Diagnosis
 from hwid_cli.records.drive import StandIn
 from hwid_cli.records.experiment import DiagnoseOptions
-from hwid_cli.records.programs import SimulatorRun, StandInChange
+from hwid_cli.records.programs import FreeParameter, SimulatorRun, StandInChange
 from hwid_cli.records.recordings import Recording
 
 # Searches, each from where the last one has moved the parameters.
@@ -60,8 +60,9 @@ _BESIDE_PARAMETERS = (
     "with displacement, velocity and input act beside them, as factors under "
     "simulation.stand_in in extended_simulation.yaml"
 )
-# A parameter is at a bound within this share of its stated value, [-].
-_AT_BOUND = 1e-3
+# A parameter is at a bound within this share of its stated value, and far away beyond this
+# factor, [-].
+_AT_BOUND, _FAR = 1e-3, 3.0
 # Values of a simulation's parameters, and what it gives with them.
 _Start = tuple[dict[str, float], Sequence[SimulatorRun]]
 
@@ -98,7 +99,7 @@ def diagnose_foreign(
     runs = begun.runs
     stated = dict(simulator.values)
     starts: tuple[_Start, _Start] = (refitted, given), (stated, begun.given)
-    if _is_at_its_bounds(begun, given, refitted):
+    if _has_imitated(begun, given, refitted):
         starts = (starts[1], starts[0])
     search = _searched(begun, starts, options, on_round)
     found, values = search.findings, search.values
@@ -142,10 +143,10 @@ def _fitted_to(
     return values, runs.of(signals, values)
 
 
-def _is_at_its_bounds(
+def _has_imitated(
     begun: Begun, given: Sequence[SimulatorRun], values: Mapping[str, float]
 ) -> bool:
-    """Whether a re-fit has led a parameter to a bound, and much is left there.
+    """Whether a re-fit has led a parameter far away, or to a bound, and leaves much.
 
     It has imitated what is missing then, as far as it may: a weight by a tenth of the
     input's gain.
@@ -153,12 +154,14 @@ def _is_at_its_bounds(
     problem, free = begun.problem, begun.runs.simulator.free
     left = float(_sse(problem.signals, given).sum())
     most = STILL_LARGE**2 * problem.n_evaluated * noise_floor(problem).rms ** 2
-    at_bounds = any(
-        abs(values[name] - bound) <= _AT_BOUND * abs(one.value)
-        for name, one in free.items()
-        for bound in one.limits
-    )
-    return left > most and at_bounds
+    return left > most and any(_is_far(one, values[name]) for name, one in free.items())
+
+
+def _is_far(stated: FreeParameter, value: float) -> bool:
+    """Whether a parameter was fitted far from its stated value."""
+    size = abs(stated.value)
+    at_bound = any(abs(value - one) <= _AT_BOUND * size for one in stated.limits)
+    return at_bound or not size / _FAR <= abs(value) <= size * _FAR
 
 
 def _said_of_runs(counted: CountedRuns, found: Findings) -> tuple[str, ...]:

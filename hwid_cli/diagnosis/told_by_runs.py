@@ -162,8 +162,10 @@ def decided_by_runs(
         return None
 
     def unclear(one: CandidateFit) -> tuple[str, ...]:
-        problem = replace(tried[one.effects].problem, known={})
-        return unclear_effects(problem, one, findings.scales)
+        # What the stand-in alone has fitted was not run.
+        turn = tried.get(one.effects)
+        problem = findings.problem if turn is None else turn.problem
+        return unclear_effects(replace(problem, known={}), one, findings.scales)
 
     verdict = decide(criteria, findings.given_sse, base, fits, best, unclear)
     chosen = verdict.chosen

@@ -428,6 +428,34 @@ def test_a_spring_of_rounding_does_not_keep_an_effect_from_the_simulation():
     assert effect.parameters[0].value == pytest.approx(0.35, rel=0.02)
 
 
+@pytest.mark.parametrize(
+    ("gain", "left", "imitates"),
+    [
+        # At its bound; far from what is stated; near it; or where next to nothing is left.
+        (0.5, 30.0, True),
+        (2.0, 30.0, True),
+        (6.0, 30.0, False),
+        (0.5, 2.0, False),
+    ],
+)
+def test_a_refit_that_is_led_far_away_in_vain_has_imitated_something(
+    monkeypatch, gain, left, imitates
+):
+    n, noise = 100, 1e-3
+    signals = [
+        SimpleNamespace(compared=left * noise * np.ones(n), evaluated=slice(None))
+    ]
+    monkeypatch.setattr(foreign, "noise_floor", lambda _: SimpleNamespace(rms=noise))
+    free = {"gain": FreeParameter(8.0, (0.5, 100.0)), "rubs": FreeParameter(1.0)}
+    begun = SimpleNamespace(
+        problem=SimpleNamespace(signals=signals, n_evaluated=n),
+        runs=SimpleNamespace(simulator=SimpleNamespace(free=free)),
+    )
+    given = [SimulatorRun(np.zeros(n), np.zeros(0))]
+    values = {"gain": gain, "rubs": 1.1}
+    assert foreign._has_imitated(begun, given, values) is imitates
+
+
 SWING_S, SWUNG = 2e-3, 600
 PENDULUM_TIME = SWING_S * np.arange(SWUNG)
 

@@ -441,13 +441,18 @@ def test_the_error_of_a_stand_in_is_about_what_it_makes_wrong(share):
     assert wrong < 1e-4 * gap
 
 
-def test_a_stand_in_of_a_linear_drive_has_no_error(given):
-    runs = [SimulatorRun(linear(GAIN * one), NOTHING) for one in INPUTS]
+@pytest.mark.parametrize("level", [0.0, 20.0])
+def test_a_stand_in_of_a_linear_drive_has_no_error(given, level):
+    # A room's temperature is 20 times what the input adds to it.
+    largest = max(np.ptp(linear(GAIN * one)) for one in INPUTS)
+    level *= largest
+    runs = [SimulatorRun(level + linear(GAIN * one), NOTHING) for one in INPUTS]
     told = [
-        replace(one, output=1.5 * run_of.output, compared=1.5 * run_of.output)
+        replace(one, output=moved, compared=moved)
         for one, run_of in zip(given, runs, strict=True)
+        for moved in [level + 1.5 * (run_of.output - level)]
     ]
-    gap = sum(float(np.sum((0.5 * one.output) ** 2)) for one in runs)
+    gap = sum(float(np.sum((0.5 * (one.output - level)) ** 2)) for one in runs)
     assert error_of(fit_stand_in(given, runs), told, runs) < 1e-6 * gap
 
 
