@@ -158,10 +158,11 @@ def _has_imitated(
 
 
 def _is_far(stated: FreeParameter, value: float) -> bool:
-    """Whether a parameter was fitted far from its stated value."""
+    """Whether a parameter was fitted far from its stated value; of 0 nothing is far."""
     size = abs(stated.value)
     at_bound = any(abs(value - one) <= _AT_BOUND * size for one in stated.limits)
-    return at_bound or not size / _FAR <= abs(value) <= size * _FAR
+    is_away = not size / _FAR <= abs(value) <= size * _FAR
+    return at_bound or (is_away and size > 0)
 
 
 def _said_of_runs(counted: CountedRuns, found: Findings) -> tuple[str, ...]:

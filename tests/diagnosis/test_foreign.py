@@ -446,13 +446,17 @@ def test_a_refit_that_is_led_far_away_in_vain_has_imitated_something(
         SimpleNamespace(compared=left * noise * np.ones(n), evaluated=slice(None))
     ]
     monkeypatch.setattr(foreign, "noise_floor", lambda _: SimpleNamespace(rms=noise))
-    free = {"gain": FreeParameter(8.0, (0.5, 100.0)), "rubs": FreeParameter(1.0)}
+    free = {
+        "gain": FreeParameter(8.0, (0.5, 100.0)),
+        "rubs": FreeParameter(1.0),
+        "offset": FreeParameter(0.0),
+    }
     begun = SimpleNamespace(
         problem=SimpleNamespace(signals=signals, n_evaluated=n),
         runs=SimpleNamespace(simulator=SimpleNamespace(free=free)),
     )
     given = [SimulatorRun(np.zeros(n), np.zeros(0))]
-    values = {"gain": gain, "rubs": 1.1}
+    values = {"gain": gain, "rubs": 1.1, "offset": 0.3}
     assert foreign._has_imitated(begun, given, values) is imitates
 
 
