@@ -42,6 +42,8 @@ from hwid_cli.tasks.task import one_thread
 from hwid_cli.tasks.workers import Workers
 
 _EXIT_PROBLEMS = 1
+# As many files with the same problem are told one by one.
+_FEW = 3
 
 
 def check(
@@ -215,7 +217,24 @@ def _cost(
     return replace(found, joint=time_joint_fits(experiment, checked.recordings))
 
 
-def _end_with(problems: tuple[str, ...]) -> NoReturn:
+def _once(problems: Sequence[str]) -> list[str]:
+    """Problems, but of those that many files have, in the same words, the first one.
+
+    A slip in the configuration is one, however many files there are.
+    """
+    alike: dict[str, list[str]] = {}
     for problem in problems:
+        alike.setdefault(problem.partition(": ")[2] or problem, []).append(problem)
+    return [
+        f"{same[0]} ({len(same) - 1} more files have the same)"
+        if len(same) > _FEW
+        else problem
+        for same in alike.values()
+        for problem in (same[:1] if len(same) > _FEW else same)
+    ]
+
+
+def _end_with(problems: Sequence[str]) -> NoReturn:
+    for problem in _once(problems):
         click.echo(f"hwid: {' '.join(problem.split())}", err=True)
     raise click.exceptions.Exit(_EXIT_PROBLEMS)

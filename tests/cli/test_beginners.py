@@ -50,6 +50,15 @@ def test_a_slip_in_the_configuration_is_told(folder, old, new, line):
     assert line in said("check", "mine.yaml")
 
 
+def test_a_slip_that_all_files_show_is_told_once(folder):
+    for name in ("three", "four", "five"):
+        (folder / "raw" / f"{name}.csv").write_text(TABLE)
+    (folder / "mine.yaml").write_text(CONFIG.replace("I (mA)", "J (mA)"))
+    told = said("check", "mine.yaml")
+    assert told.count("has no column 'J (mA)' for the input") == 1
+    assert "(4 more files have the same)" in told
+
+
 def test_a_folder_and_a_configuration_in_the_wrong_place_are_told(folder):
     line = "raw: is a folder; expected a YAML file"
     assert line in said("run", "raw")
