@@ -62,7 +62,7 @@ _BESIDE_PARAMETERS = (
 )
 # A parameter is at a bound within this share of its stated value, and far away beyond this
 # factor, [-].
-_AT_BOUND, _FAR = 1e-3, 3.0
+_AT_BOUND, _FAR = 1e-3, 5.0
 # Values of a simulation's parameters, and what it gives with them.
 _Start = tuple[dict[str, float], Sequence[SimulatorRun]]
 

@@ -255,10 +255,12 @@ class _Search:
         if is_large and any(criteria.is_complete(one) for one in fits):
             return False
         if any(CATALOGUE[one].is_of_start for one in ids) and narrow:
+            base = self.rounds.base
+            best = self.fits.best_of_size(len(ids))
+            if best is not None and criteria.is_nearly_all(best, base):
+                return False
             part = self.fits.largest_part(ids)
-            return self._stands_out(
-                [screened[one] for one in narrow], part or self.rounds.base
-            )
+            return self._stands_out([screened[one] for one in narrow], part or base)
         wide = [one for one in narrow if includes_one_of(one, screened)]
         return not wide or any(self._brought(one, screened) for one in wide)
 

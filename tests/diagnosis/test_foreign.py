@@ -433,8 +433,8 @@ def test_a_spring_of_rounding_does_not_keep_an_effect_from_the_simulation():
     [
         # At its bound; far from what is stated; near it; or where next to nothing is left.
         (0.5, 30.0, True),
-        (2.0, 30.0, True),
-        (6.0, 30.0, False),
+        (1.5, 30.0, True),
+        (2.0, 30.0, False),
         (0.5, 2.0, False),
     ],
 )

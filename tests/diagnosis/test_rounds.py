@@ -82,11 +82,13 @@ def test_every_effect_gets_a_forecast_and_a_screening(friction):
     assert set(friction.found.shares) == alone
     # What includes friction cannot be better than friction, which leaves nothing.
     wider = {one for one in alone if "coulomb_friction" in CATALOGUE[one[0]].contains}
-    # What includes a wider law comes only where that has brought something.
+    # What includes a wider law, or starts otherwise, comes only where that has brought
+    # something.
     third = {
         one
         for one in alone
-        if any(CATALOGUE[other].contains for other in CATALOGUE[one[0]].contains)
+        if CATALOGUE[one[0]].is_of_start
+        or any(CATALOGUE[other].contains for other in CATALOGUE[one[0]].contains)
     }
     screened = set(friction.effects_of("screen")) - {()}
     assert screened <= alone - wider

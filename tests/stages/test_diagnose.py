@@ -294,7 +294,7 @@ def test_the_stages_are_announced(with_friction):
     diagnosed(few, on_stage=lambda what, count: seen.append((what, count)))
     assert seen == [
         ("base", 0),
-        ("forecasts", 3),
+        ("forecasts", 4),
         ("single effects, screening", 3),
         ("single effects", 3),
         ("single effects, with the noise of the input", 2),
