@@ -121,19 +121,27 @@ def signal_unit(
     if options is None:
         raise ValueError("an experiment without recordings has no signals")
     _refuse_other_quantity(column, role, experiment.source, options)
-    found = _signal_unit(column, role, experiment)
-    scale = factor_between(column.unit, found.given) if column.unit else None
-    is_other = scale is not None and abs(scale - 1.0) > _SAME_FACTOR
+    found = _signal_unit(column, role, experiment, options)
+    is_other = _contradicts(column.unit, getattr(options.units, role))
     return replace(found, overruled=column.unit) if is_other else found
 
 
+def _contradicts(unit: str, stated: str | None) -> bool:
+    """Whether a file has numbers of another size than the configuration says."""
+    if not unit or stated in (None, AS_FILE):
+        return False
+    factor = factor_between(unit, stated)
+    return factor is not None and abs(factor - 1.0) > _SAME_FACTOR
+
+
 def _signal_unit(
-    column: MeasuredColumn, role: str, experiment: Experiment
+    column: MeasuredColumn,
+    role: str,
+    experiment: Experiment,
+    options: RecordingsOptions,
 ) -> SignalUnit:
     """The same, whatever the file says beside."""
-    options, simulation = experiment.recordings, experiment.simulation
-    if options is None:
-        raise ValueError("an experiment without recordings has no signals")
+    simulation = experiment.simulation
     label = getattr(options, f"{role}_unit")
     given, said_by = _given(column, role, options)
     stated = getattr(options.units, role)

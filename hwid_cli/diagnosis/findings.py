@@ -511,6 +511,10 @@ def _fitted_effects_of(
                 own = ParameterRef(identifier, parameter.name)
                 column = found.own_names.index(own)
                 parameters[identifier].append(_spread(np.exp(found.own[:, column])))
+            elif parameter.is_own and entry.is_of_start:
+                # Stated, it says that each recording has a start of its own.
+                told = FittedParameter(parameter.name, parameter.default or 0.0)
+                parameters[identifier].append(told)
     return tuple(_described(one, parameters[one]) for one in ids)
 
 

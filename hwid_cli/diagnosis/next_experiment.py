@@ -353,7 +353,7 @@ def _at_rest(candidate: FittedCandidate) -> ParameterPoint:
     """The values of one recording, which starts at rest where the first one does."""
     own = candidate.point.own[:1].copy()
     for column, one in enumerate(candidate.layout.own):
-        if one.owner == START and one.name != "position":
+        if one.owner == START and one.name in ("velocity", "current"):
             own[:, column] = one.coordinate(0.0)
     return ParameterPoint(candidate.point.shared, own)
 

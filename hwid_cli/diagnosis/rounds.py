@@ -244,8 +244,7 @@ class _Search:
         """Whether a set may be better than those that it includes.
 
         Not where one of these leaves nothing but noise, or was a wider one itself and
-        brought nothing: no shape of hysteresis is needed where hysteresis is not. Where
-        play starts matters only where play itself explains much.
+        brought nothing: no shape of hysteresis is needed where hysteresis is not.
         """
         narrow = [one for one in screened if includes_one_of(ids, [one])]
         criteria = self.rounds.criteria
@@ -255,14 +254,20 @@ class _Search:
         if is_large and any(criteria.is_complete(one) for one in fits):
             return False
         if any(CATALOGUE[one].is_of_start for one in ids) and narrow:
-            base = self.rounds.base
-            best = self.fits.best_of_size(len(ids))
-            if best is not None and criteria.is_nearly_all(best, base):
-                return False
-            part = self.fits.largest_part(ids)
-            return self._stands_out([screened[one] for one in narrow], part or base)
+            return self._may_start_elsewhere(ids, [screened[one] for one in narrow])
         wide = [one for one in narrow if includes_one_of(one, screened)]
         return not wide or any(self._brought(one, screened) for one in wide)
+
+    def _may_start_elsewhere(self, ids: Effects, narrow: Sequence[Screened]) -> bool:
+        """Whether starts of the recordings may be what a set still lacks.
+
+        Where play starts matters only where play itself explains much, and nothing else
+        explains all.
+        """
+        base, best = self.rounds.base, self.fits.best_of_size(len(ids))
+        if best is not None and self.rounds.criteria.is_nearly_all(best, base):
+            return False
+        return self._stands_out(narrow, self.fits.largest_part(ids) or base)
 
     def _brought(self, ids: Effects, screened: Mapping[Effects, Screened]) -> bool:
         """Whether a set got further in its screening than those that it includes."""

@@ -50,6 +50,14 @@ def test_a_slip_in_the_configuration_is_told(folder, old, new, line):
     assert line in said("check", "mine.yaml")
 
 
+def test_a_scale_that_converts_is_no_contradiction(folder):
+    scaled = "  input_unit: A\n  input_scale: 0.001\norders:"
+    (folder / "mine.yaml").write_text(CONFIG.replace("orders:", scaled))
+    told = said("check", "mine.yaml")
+    assert "2 recordings" in told
+    assert "but the file of" not in told
+
+
 def test_a_slip_that_all_files_show_is_told_once(folder):
     for name in ("three", "four", "five"):
         (folder / "raw" / f"{name}.csv").write_text(TABLE)

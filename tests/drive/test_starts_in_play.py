@@ -69,3 +69,16 @@ def test_a_free_axis_starts_where_it_is_measured(share):
     assert found[0] == 0.0
     # The drive is behind what is measured, and pushes it that much later.
     assert found[-1] - plain[-1] == pytest.approx(share * -GAP_M, rel=1e-9)
+
+
+def test_a_motor_that_is_warm_at_first_pushes_less_from_the_first_sample_on():
+    command = np.ones(400)
+    values = {"loss_at_reference": 0.3, "time_constant_s": 1e9, "start_warmth": 0.5}
+    warm = {"thermal_gain_loss": values}
+    found, plain = (
+        run(Drive(2.0, 80.0, 500.0, constant, effects=effects), command)
+        for constant, effects in ((1.0, warm), (0.85, {}))
+    )
+    # It rests where its own force holds it, and stays as warm as it is.
+    np.testing.assert_allclose(found, plain, rtol=1e-9)
+    assert found[0] == pytest.approx(0.85 / 500.0)
