@@ -1,12 +1,20 @@
 """The band of a diagnosed simulation, on a machine that is not the program's drive."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hwid_cli import SimulationOptions, diagnose
+from hwid_cli.diagnosis.parameters import (
+    START,
+    ParameterLayout,
+    ParameterPoint,
+    Unknown,
+)
 from hwid_cli.diagnosis.problem import drive_of, prepare
+from hwid_cli.diagnosis.simulation_trust import _as_unseen
 from hwid_cli.drive.simulation import simulate_drive
 from hwid_cli.export.contents import export_simulation
 from hwid_cli.export.json_reader import read_exported
@@ -168,3 +176,24 @@ def test_an_exported_simulation_predicts_with_the_same_band(right, tmp_path):
     assert np.array_equal(band.lower, expected.lower)
     plain = simulate_drive(new.input, drive, sample_time_s=SAMPLE_TIME_S).output
     assert np.array_equal(band.output, plain)
+
+
+@pytest.mark.parametrize(("start", "place"), [("rest", 0.6), ("estimated", 0.75)])
+def test_a_held_out_axis_begins_where_it_is_read_to_rest(start, place):
+    # A fitted place would take a part of a later drift off.
+    far = float("inf")
+    layout = ParameterLayout(
+        (), (Unknown(START, "position", False, 2.0, -far, far),), ()
+    )
+    signals = [
+        SimpleNamespace(is_held_out=is_held, rest_position_m=0.6)
+        for is_held in (False, True)
+    ]
+    own = np.array([[layout.own[0].coordinate(0.75)]] * 2)
+    seen = _as_unseen(
+        SimpleNamespace(signals=signals, start=start),
+        layout,
+        ParameterPoint(np.zeros(0), own),
+    )
+    places = [layout.own[0].value(one) for (one,) in seen.own]
+    assert places == pytest.approx([0.75, place])
