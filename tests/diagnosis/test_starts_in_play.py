@@ -68,6 +68,7 @@ def test_gear_play_is_named_wherever_the_last_motion_left_the_teeth():
     assert found.after.ratio_to_noise < 1.1
     values = {one.name: one.value for one in found.effects[0].parameters}
     assert values["half_gap_m"] == pytest.approx(GAP_M, rel=0.02)
+    assert values["start_share"] == 0.0
     # What was found says that each recording starts elsewhere: nothing is missing then.
     again = diagnose(recordings, extended_options(found, SIMULATION), OPTIONS)
     assert again.verdict in ("none", "parameters")
