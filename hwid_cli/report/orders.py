@@ -245,11 +245,11 @@ def axes_to_widen(advice: OrderAdvice, nb: int, nk: int) -> list[str]:
 
 
 def _edges(advice: OrderAdvice) -> str:
-    axes = axes_to_widen(advice, advice.overall.best_nb, advice.overall.best_nk)
+    axes = axes_to_widen(advice, advice.overall.nb, advice.overall.nk)
     if not axes:
         return ""
     return (
-        f"The best orders lie at the edge of the grid: widen {' and '.join(axes)} to see "
+        f"These orders lie at the edge of the grid: widen {' and '.join(axes)} to see "
         "whether larger ones are better still."
     )
 

@@ -82,12 +82,15 @@ def names_in(said: str) -> dict[str, str]:
     block = re.sub(
         r"\s+", " ", said.partition("best model")[2].partition(" orders ")[0]
     )
-    found = re.findall(_NAME, block)
-    linear = [one for one in found if one.startswith("linear:")]
-    single = re.findall(rf"here: {_NAME} alone", block)
+    taken, *others = re.findall(_NAME, block)
+    linear = [one for one in (taken, *others) if one.startswith("linear:")]
+    # Of several recordings it is named by their number, and they are those of the other.
+    orders = re.findall(r"linear model, of \d+ recordings, orders (\d+/\d+)", block)
+    of_all = [f"linear:{taken.split('/')[0]}/{one}" for one in orders]
+    single = re.findall(rf"here: {_NAME}, the single model", block)
     return {
-        "taken": found[0],
-        "linear": linear[0] if linear else "",
+        "taken": taken,
+        "linear": [*linear, *of_all, ""][0],
         "single": single[0] if single else "",
     }
 

@@ -75,17 +75,22 @@ def test_the_recommendation_says_why():
             "There is no validation recording",
         ),
         (
-            {"best_nb": 4, "best_nk": 5},
+            {"nb": 4, "nk": 5},
             "widen orders.nb (beyond 4) and orders.nk (beyond 5)",
         ),
     ],
 )
 def test_each_case_has_its_reason(changes, words):
-    places = {key: value for key, value in changes.items() if key.startswith("best_n")}
+    names = {"nb", "nk", "best_nb", "best_nk"}
+    places = {key: value for key, value in changes.items() if key in names}
     others = {key: value for key, value in changes.items() if key not in places}
     evidence = replace(JUDGEMENT, **others)
 
     assert words in said(overall=replace(OVERALL, evidence=evidence, **places))
+
+
+def test_a_grid_is_wide_enough_where_smaller_orders_are_taken():
+    assert "widen" not in said(overall=replace(OVERALL, best_nb=4, best_nk=5))
 
 
 @pytest.mark.parametrize(
