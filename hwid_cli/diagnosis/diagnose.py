@@ -465,10 +465,12 @@ def _on_whole_recordings(searched: _Searched, options: DiagnoseOptions) -> _Sear
         smoothed = latent_force(given, rounds.problem.drive, rounds.baseline.noise)
         seeds, near, wide = seeds_of_pieces(rounds, smoothed, max_effects)
         searched = replace(searched, seeds=seeds, smoothed=smoothed)
-        for these in ((*seeds, *near), wide):
-            found = continue_rounds(rounds, found, these)
-            if found.best and criteria.is_nearly_all(found.best[-1], rounds.base):
-                return replace(searched, found=found)
+        found = continue_rounds(rounds, found, (*seeds, *near))
+        # What a plain stop leaves, one with a damper may be.
+        if not (found.best and criteria.leaves_noise(found.best[-1])):
+            found = continue_rounds(rounds, found, wide)
+        if found.best and criteria.is_nearly_all(found.best[-1], rounds.base):
+            return replace(searched, found=found)
         if not is_lost(
             criteria, decided(rounds, searched.given_sse, found), rounds.base
         ):
