@@ -467,7 +467,9 @@ def _on_whole_recordings(searched: _Searched, options: DiagnoseOptions) -> _Sear
         searched = replace(searched, seeds=seeds, smoothed=smoothed)
         found = continue_rounds(rounds, found, (*seeds, *near))
         # What a plain stop leaves, one with a damper may be.
-        if not (found.best and criteria.leaves_noise(found.best[-1])):
+        if found.best and not (
+            criteria.leaves_noise(found.best[-1]) or _is_enough_if_held(rounds, found)
+        ):
             found = continue_rounds(rounds, found, wide)
         if found.best and criteria.is_nearly_all(found.best[-1], rounds.base):
             return replace(searched, found=found)
@@ -475,13 +477,12 @@ def _on_whole_recordings(searched: _Searched, options: DiagnoseOptions) -> _Sear
             criteria, decided(rounds, searched.given_sse, found), rounds.base
         ):
             known = found
-    may_be_enough = rounds.problem.may_be_held and rounds.problem.drive.hold == LINE
 
     has_law = False
 
     def is_enough(so_far: RoundsResult) -> bool:
         nonlocal has_law
-        if may_be_enough and is_settled_if_held(rounds, so_far):
+        if _is_enough_if_held(rounds, so_far):
             return True
         if len(so_far.best) < max_effects:
             has_law = _has_short_law(replace(searched, found=so_far), options)
@@ -492,6 +493,13 @@ def _on_whole_recordings(searched: _Searched, options: DiagnoseOptions) -> _Sear
         max_effects = min(max_effects, 1)
     found = run_rounds(rounds, max_effects, is_enough, known)
     return replace(searched, found=found, has_short_law=has_law)
+
+
+def _is_enough_if_held(rounds: Rounds, found: RoundsResult) -> bool:
+    """Whether next to nothing remains beside a held command, where it may be held."""
+    problem = rounds.problem
+    is_line = problem.may_be_held and problem.drive.hold == LINE
+    return is_line and is_settled_if_held(rounds, found)
 
 
 def _has_short_law(searched: _Searched, options: DiagnoseOptions) -> bool:

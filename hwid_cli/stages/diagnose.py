@@ -70,7 +70,7 @@ from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks
 from hwid_cli.tasks.task import Task, one_thread
 
 NAME = "diagnose"
-STAGE_VERSION = 60
+STAGE_VERSION = 61
 
 _Answer = TypeVar("_Answer")
 
