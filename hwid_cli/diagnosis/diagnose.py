@@ -32,6 +32,7 @@ from hwid_cli.diagnosis.held_command import (
     does_as_well,
     is_held,
     is_settled_if_held,
+    most_likely,
     other_command,
     with_held_command,
 )
@@ -199,7 +200,13 @@ def _held_or_not(
     searched = _searched(fitted, options, run_tasks, on_round, given_sse)
     rounds, found = searched.rounds, searched.found
     if held is not None and searched.has_gap and is_held(rounds, found):
-        again = _searched(held, options, run_tasks, on_round, given_sse)
+        again = _begun_search(held, options, run_tasks, on_round, given_sse)
+        seeds = most_likely(rounds, found)
+        likely = continue_rounds(again.rounds, RoundsResult(), seeds)
+        if again.rounds.criteria.is_complete(best_of(again.rounds, likely)):
+            again = replace(again, found=likely)
+        else:
+            again = _searched(held, options, run_tasks, on_round, given_sse)
         best = best_of(again.rounds, again.found)
         if does_as_well(rounds, best, best_of(rounds, found)):
             searched = again
@@ -419,6 +426,18 @@ def _beside(
     given_sse: np.ndarray | None,
 ) -> _Searched:
     """Search for sets of effects beside a base."""
+    begun = _begun_search(fitted, options, run_tasks, on_round, given_sse)
+    return _on_whole_recordings(begun, options)
+
+
+def _begun_search(
+    fitted: FittedBase,
+    options: DiagnoseOptions,
+    run_tasks: RunTasks,
+    on_round: OnRound,
+    given_sse: np.ndarray | None,
+) -> _Searched:
+    """What a search beside a base begins with: nothing is found yet."""
     problem, noise, base = fitted.problem, fitted.noise, fitted.base
     drive = fitted_drive(problem.drive, base)
     before = compared_with_fit(problem, base, fitted.scales)
@@ -440,8 +459,7 @@ def _beside(
         run_tasks,
         on_round,
     )
-    searched = _Searched(rounds, given_sse, before, force, RoundsResult(), (), force)
-    return _on_whole_recordings(searched, options)
+    return _Searched(rounds, given_sse, before, force, RoundsResult(), (), force)
 
 
 def _with_odd_ones_trained(fitted: FittedBase) -> FittedBase:

@@ -29,6 +29,8 @@ from hwid_cli.records.drive import HELD, LINE
 
 # Sets that are tried beside the best one.
 MOST_OTHERS = 4
+# Sets that a search beside a held command begins with.
+_MOST_LIKELY = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +111,17 @@ def is_held(rounds: Rounds, found: RoundsResult) -> bool:
     """
     best = best_of(rounds, found)
     return bool(_better_if_held(rounds, best, _worth_trying(rounds, found, best)))
+
+
+def most_likely(rounds: Rounds, found: RoundsResult) -> list[CandidateFit]:
+    """The sets that a search beside the other command begins with, the best first.
+
+    Half a sample moves all of them alike: what is far behind here is so there as well.
+    """
+    usable = [one for one in found.fits.values() if one.is_usable]
+    usable.sort(key=lambda one: -rounds.criteria.gain(one, rounds.base))
+    best = [one for one in found.best if one not in usable[:_MOST_LIKELY]]
+    return [*usable[:_MOST_LIKELY], *best]
 
 
 def does_as_well(rounds: Rounds, held: CandidateFit, line: CandidateFit) -> bool:
