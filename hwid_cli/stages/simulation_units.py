@@ -16,6 +16,7 @@ from hwid_cli.diagnosis.few_samples import fewer_recordings
 from hwid_cli.diagnosis.problem import Compared, prepare
 from hwid_cli.errors import ConfigError
 from hwid_cli.records.experiment import (
+    AS_FILE,
     DiagnoseOptions,
     Experiment,
     RecordingsOptions,
@@ -442,13 +443,40 @@ def overruled_units(
     source : str
         Of the configuration.
     read : sequence of RawRecording or CalibrationLog
-        Of one of them for each signal a line.
+        Of one experiment.
+
+    Returns
+    -------
+    list of str
+        One line for all recordings that contradict it alike.
     """
-    units = {one.role: (each, one) for each in read for one in each.units}
+    found: dict[SignalUnit, list[str]] = {}
+    for each in read:
+        for one in each.units:
+            if one.overruled:
+                found.setdefault(one, []).append(each.name)
     return [
-        f"{source}: {one.said_by}: found {one.given!r}, but the file of {each.name} says "
-        f"{one.overruled!r}; expected the same; {one.given!r} counts: correct it, unless "
-        "the file is wrong"
-        for each, one in units.values()
-        if one.overruled
+        f"{source}: {one.said_by}: found {one.given!r}, but {_files_of(names)} "
+        f"{one.overruled!r}; expected the same; {one.given!r} counts: "
+        + (
+            "correct it, unless the file is wrong"
+            if len(names) == len(read)
+            else f"say {AS_FILE!r} there, so that each file's own unit counts, or correct "
+            "the file"
+        )
+        for one, names in found.items()
     ]
+
+
+def _files_of(names: Sequence[str]) -> str:
+    """The first of some files and how many more, and that they say.
+
+    Examples
+    --------
+    >>> _files_of(["a"]), _files_of(["a", "b", "c"])
+    ('the file of a says', 'the files of a and 2 others say')
+    """
+    if len(names) == 1:
+        return f"the file of {names[0]} says"
+    others = "another" if len(names) == 2 else f"{len(names) - 1} others"
+    return f"the files of {names[0]} and {others} say"

@@ -19,6 +19,7 @@ from hwid_cli.stages.simulation_units import (
     assumed_units,
     doubtful_sizes,
     in_simulation_units,
+    overruled_units,
     refused_sizes,
     refused_units,
 )
@@ -143,6 +144,37 @@ def test_what_is_known_is_not_assumed():
     line = with_units(known, SignalUnit("output", "-", "recordings.output_unit", "-"))
     assert "unit of the output: taken as m," in line
     assert line.endswith("{output: m} in place of recordings.output_unit")
+
+
+@pytest.mark.parametrize(
+    ("overruled", "says", "step"),
+    [
+        (("A", ""), "the file of r0 says 'A'", "say 'file' there"),
+        (("", "A", "A"), "the files of r1 and another say 'A'", "say 'file' there"),
+        (("A", "A", "A"), "the files of r0 and 2 others say 'A'", "correct it"),
+    ],
+)
+def test_files_that_contradict_a_stated_unit_are_named(overruled, says, step):
+    found = [
+        replace(
+            with_units(
+                SignalUnit("input", "mA", "recordings.units.input", "A", 1e-3, one)
+            ),
+            name=f"r{number}",
+        )
+        for number, one in enumerate(overruled)
+    ]
+
+    (line,) = overruled_units("own.yaml", found)
+
+    assert line.startswith("own.yaml: recordings.units.input: found 'mA', but " + says)
+    assert step in line
+
+
+def test_files_that_agree_with_a_stated_unit_are_no_matter():
+    agreed = with_units(SignalUnit("input", "mA", "recordings.units.input", "A", 1e-3))
+
+    assert overruled_units("own.yaml", [agreed]) == []
 
 
 def rescaled(*, current=1.0, displacement=1.0, step=1.0, **changes):
