@@ -25,6 +25,7 @@ from hwid_cli.export.effects_alone import write_effects
 from hwid_cli.export.extended_fmu import write_extended_fmu
 from hwid_cli.export.formats import write_exported
 from hwid_cli.export.python_module import write_module
+from hwid_cli.files.suggestions import did_you_mean
 from hwid_cli.records.best_model import LINEAR
 from hwid_cli.records.experiment import RecordingsOptions
 from hwid_cli.records.exported import Exported
@@ -39,6 +40,7 @@ from hwid_cli.stages.extended_program import (
     told_difference,
 )
 from hwid_cli.stages.model_views import named_fits
+from hwid_cli.stages.table import to_run
 from hwid_cli.stages.trust import kept_for_test, trust_of
 from hwid_cli.store.result_files import has_left_results, read_provenance, results_file
 
@@ -129,6 +131,7 @@ def chosen_model(session: Session, asked: str, *, with_trust: bool = False) -> E
         fit = linear_model(session, asked, "export")
         title = f"{LINEAR}{thesis_name_of(fit.name, fit.orders)}"
         return _exported(session, fit, (asked, title), "calibrate", with_trust)
+    _refuse_other_recordings(session, asked)
     named, stage = _named_fits(session, asked)
     titles = {
         thesis_name_of(name.rsplit("/", 2)[0], fit.orders): name
@@ -140,11 +143,28 @@ def chosen_model(session: Session, asked: str, *, with_trust: bool = False) -> E
     return _exported(session, fit, (name, title), made_by, with_trust)
 
 
+def _refuse_other_recordings(session: Session, asked: str) -> None:
+    """Refuse a model of recordings that there are none of, before fits take their time."""
+    joined, *orders = asked.rsplit("/", 2)
+    if len(orders) < 2:
+        return
+    known = [one.name for one in result_of(session, "calibrate").recordings]
+    if other := [one for one in joined.split("+") if one not in known]:
+        raise ConfigError(
+            f"--model {asked}: no recording {other[0]!r}; {did_you_mean(other[0], known)}"
+        )
+
+
 def _best_name(session: Session, *, is_linear: bool) -> str:
-    """Name of the model to take by the stages that have run, or of the linear one beside it."""
+    """Name of the model that ``hwid run`` ends with, or of the linear one beside it.
+
+    Stages that the configuration names run where they have not: without one of them
+    another model is the best.
+    """
+    asked = ("identify", *to_run(session.experiment))
     for stage in ("identify", "crossval", "group", "test"):
         path = session.out / results_file(stage)
-        if stage == "identify" or has_left_results(path, stage):
+        if stage in asked or has_left_results(path, stage):
             result_of(session, stage)
     best = recommended(session)
     if best is None or not best.is_usable:

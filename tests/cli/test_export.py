@@ -78,6 +78,26 @@ def test_a_name_that_is_longer_than_a_line_is_not_asked_for(
     assert hwid("run").stdout.rstrip().endswith("--model best")
 
 
+def test_a_recording_that_there_is_not_is_told_before_anything_is_fitted(hwid, out):
+    result = hwid("export", "--model", "step_2/1/1")
+
+    assert result.exit_code == 1
+    assert "--model step_2/1/1: no recording 'step_2'; did you mean" in result.stderr
+    assert not (out / "results.h5").exists()
+
+
+def test_the_best_model_waits_for_the_stages_that_are_to_run(
+    monkeypatch, after_run, hwid, config, out
+):
+    # As after a run that was killed while it grouped.
+    options = "{start: [sine_12], keep: {best: true}, max_level: 2}"
+    config.write_text(config.read_text() + f"group: {options}\n")
+    assert not (out / "groups.csv").exists()
+
+    assert hwid("export", "--model", "best").exit_code == 0
+    assert (out / "groups.csv").exists()
+
+
 @pytest.mark.thorough
 def test_stages_before_run(hwid, out):
     result = hwid("export", "--model", "step_02/1/1")

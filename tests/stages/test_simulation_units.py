@@ -146,6 +146,12 @@ def test_what_is_known_is_not_assumed():
     assert line.endswith("{output: m} in place of recordings.output_unit")
 
 
+def log_of(name, *, overruled):
+    said_by = "recordings.units.input"
+    unit = SignalUnit("input", "mA", said_by, "A", 1e-3, overruled)
+    return CalibrationLog(name, (), 0, 1, 1, 1, units=(unit,))
+
+
 @pytest.mark.parametrize(
     ("overruled", "says", "step"),
     [
@@ -156,13 +162,7 @@ def test_what_is_known_is_not_assumed():
 )
 def test_files_that_contradict_a_stated_unit_are_named(overruled, says, step):
     found = [
-        replace(
-            with_units(
-                SignalUnit("input", "mA", "recordings.units.input", "A", 1e-3, one)
-            ),
-            name=f"r{number}",
-        )
-        for number, one in enumerate(overruled)
+        log_of(f"r{number}", overruled=one) for number, one in enumerate(overruled)
     ]
 
     (line,) = overruled_units("own.yaml", found)
@@ -172,9 +172,7 @@ def test_files_that_contradict_a_stated_unit_are_named(overruled, says, step):
 
 
 def test_files_that_agree_with_a_stated_unit_are_no_matter():
-    agreed = with_units(SignalUnit("input", "mA", "recordings.units.input", "A", 1e-3))
-
-    assert overruled_units("own.yaml", [agreed]) == []
+    assert overruled_units("own.yaml", [log_of("r0", overruled="")]) == []
 
 
 def rescaled(*, current=1.0, displacement=1.0, step=1.0, **changes):
