@@ -11,7 +11,12 @@ from hwid_cli.config.starter import (
     starter_text,
     write_starter,
 )
-from hwid_cli.data.folder import STAR, guess_layout, list_measurements
+from hwid_cli.data.folder import (
+    STAR,
+    guess_layout,
+    list_measurements,
+    with_slower_grid,
+)
 from hwid_cli.data.recordings import survey_recordings
 from hwid_cli.errors import MeasurementError
 from hwid_cli.records.starter import FolderLayout, Proposal
@@ -27,6 +32,10 @@ def write_starter_configuration(
     refuse_existing(out, force=force)
     layout = guess_layout(list_measurements(folder))
     survey = survey_recordings(draft_experiment(layout, folder), folder)
+    slower = with_slower_grid(layout, survey.sample_times_s.values())
+    if slower is not layout:
+        layout = slower
+        survey = survey_recordings(draft_experiment(layout, folder), folder)
     if not survey.recordings:
         raise MeasurementError(survey.problems[0])
     may_cut = not layout.parts and layout.variable != STAR

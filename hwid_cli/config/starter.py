@@ -330,6 +330,8 @@ def _clock_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
         why = "the time column jitters or lacks samples, or a signal does in some rows"
         if layout.output_time is not None:
             why = "input and output are sampled at their own times"
+        elif layout.time is not None and layout.sample_time_s is not None:
+            why = "so that faster recordings are put on that grid"
         lines += [f"  resample: true   # {why}"]
     return lines
 

@@ -277,8 +277,9 @@ def check_sample_time(
     if abs(step - common) > tolerance * common:
         raise MeasurementError(
             f"{recording.source}: has a sample time of {step:.6g} s; expected "
-            f"{common:.6g} s as in {usual.source}, because models are discrete; make "
-            "one experiment for each sample time"
+            f"{common:.6g} s as in {usual.source}, because models are discrete; put "
+            f"all on the slower grid (recordings: sample_time_s: {max(step, common):.6g}, "
+            "resample: true), or make one experiment for each sample time"
         )
 
 

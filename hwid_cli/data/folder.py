@@ -5,8 +5,9 @@ For ``hwid init``.
 
 import glob
 import re
+import statistics
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
@@ -46,6 +47,9 @@ _MOST_ASKED = 7
 # Stands for every table of a file, and how deep these may lie.
 STAR = "*"
 _DEEPEST_TABLE = 3
+# Clocks that differ by a smaller share are one, [-]. A recording that is so many times as
+# slow as the usual one is left out: it would take too much from the others, [-].
+_SAME_CLOCK, _MOST_SLOWER = 0.01, 5.0
 
 
 def list_measurements(folder: Path) -> tuple[FoundFile, ...]:
@@ -427,6 +431,43 @@ def _with_lost_samples(
     more = f", and some in {len(lost) - 4} more" if len(lost) > 4 else ""
     note = f"samples are missing: {shown}{more}; straight lines stand for them"
     return replace(layout, resample=True, notes=(*layout.notes, note))
+
+
+def with_slower_grid(
+    layout: FolderLayout, sample_times_s: Collection[float]
+) -> FolderLayout:
+    """Put recordings that were sampled faster than others on the grid of these.
+
+    Parameters
+    ----------
+    sample_times_s : collection of float, [s]
+        Of all recordings.
+
+    Returns
+    -------
+    FolderLayout
+        The same where they agree, or where there is no column of time to tell them.
+    """
+    if layout.time is None or layout.sample_time_s is not None or not sample_times_s:
+        return layout
+    usual = statistics.median_low(sample_times_s)
+    step = max(one for one in sample_times_s if one <= _MOST_SLOWER * usual)
+    faster = [one for one in sample_times_s if one < step * (1.0 - _SAME_CLOCK)]
+    if not faster:
+        return layout
+    count = len(faster)
+    return replace(
+        layout,
+        sample_time_s=step,
+        resample=True,
+        clock_reason=f"the slowest clock; {count} recordings tick faster, up to every "
+        f"{min(faster):g} s",
+        notes=(
+            *layout.notes,
+            f"{count} recordings are sampled every {min(faster):g} s or so, others every "
+            f"{step:g} s: all are put on the slower grid",
+        ),
+    )
 
 
 def _layout(

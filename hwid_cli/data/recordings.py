@@ -295,6 +295,8 @@ class Survey:
         it, by name; without recordings that have no time column.
     missing : dict of str to int, [samples]
         Samples that a time column ticks for and the file does not hold, by name.
+    sample_times_s : dict of str to float, [s]
+        Of all recordings that could be read, those with another clock included, by name.
     """
 
     recordings: tuple[RawRecording, ...]
@@ -302,6 +304,7 @@ class Survey:
     unusable: tuple[str, ...] = ()
     jitter: dict[str, float] = field(default_factory=dict)
     missing: dict[str, int] = field(default_factory=dict)
+    sample_times_s: dict[str, float] = field(default_factory=dict)
 
 
 def survey_recordings(experiment: Experiment, out: Path) -> Survey:
@@ -353,7 +356,10 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
     common.sort(key=lambda recording: KINDS.index(recording.kind))
     good = {recording.name for recording in common}
     bad = tuple(part.name for part in parts if part.name not in good)
-    return Survey(tuple(common), tuple(problems), bad, jitter, missing)
+    sample_times_s = {one.name: one.sample_time_s for one in read}
+    return Survey(
+        tuple(common), tuple(problems), bad, jitter, missing, sample_times_s
+    )
 
 
 def _jitter(stamps: np.ndarray, *, has_gaps: bool) -> float:

@@ -58,6 +58,8 @@ _SIGNALS = ("input", "output", "reference")
 _FEWEST_SAMPLES = 20
 # Two time stamps make one step; one makes none.
 _FEWEST_STAMPS = 2
+# A clock with so short a step has samples between those of a grid, [-].
+_FASTER = 0.75
 
 
 def sample_uniformly(
@@ -102,6 +104,8 @@ def sample_uniformly(
     median = float(np.median(steps))
     if columns.output_time is not None or _lacks_samples(columns):
         return _on_common_clock(path, columns, options)
+    if options.resample and _is_faster(median, options):
+        return _on_slower_grid(path, columns, time, options.sample_time_s or median)
     _check_against_options(path, median, options)
     jumps = np.abs(steps - median) > options.sampling_tolerance * median
     if not jumps.any():
@@ -109,6 +113,29 @@ def sample_uniformly(
             time.values, np.arange(time.values.size)
         )
     return _on_even_grid(path, columns, time, jumps, options)
+
+
+def _is_faster(median: float, options: RecordingsOptions) -> bool:
+    """Whether a clock ticks clearly faster than the stated one."""
+    stated = options.sample_time_s
+    return stated is not None and median < stated * (1.0 - options.sampling_tolerance)
+
+
+def _on_slower_grid(
+    path: Path, columns: FileColumns, time: MeasuredColumn, step: float
+) -> tuple[FileColumns, float]:
+    """Put a file that was sampled faster than others on their grid.
+
+    Parameters
+    ----------
+    step : float, [s]
+        Of that grid.
+    """
+    steps = np.diff(time.values)
+    median = float(np.median(steps))
+    _check_gaps(path, time, steps, median)
+    _log.info("%s: a sample every %.9g s put on a grid of %.9g s", path, median, step)
+    return _resample(columns, time.values, step), step
 
 
 def _on_even_grid(
@@ -128,6 +155,7 @@ def _on_even_grid(
     steps = np.diff(time.values)
     median = float(np.median(steps))
     if not options.resample:
+        _check_gaps(path, time, steps, median)
         index = int(np.argmax(jumps))
         raise MeasurementError(
             f"{place_of(path, time, index + 1)}: time steps by {steps[index]:.6g} s, "
@@ -410,6 +438,11 @@ def _check_against_options(
         raise MeasurementError(
             f"{path}: the time column steps by {median:.6g} s; expected {stated:.6g} s "
             "as recordings.sample_time_s says; correct that key or leave it out"
+            + (
+                ", or set recordings.resample: true, which puts faster files on that grid"
+                if median < stated and not options.resample
+                else ""
+            )
         )
 
 
@@ -449,8 +482,8 @@ def _check_gaps(
         raise MeasurementError(
             f"{place_of(path, time, index + 1)}: time jumps by {steps[index]:.6g} s, "
             f"from {time.values[index]:.9g} s to {time.values[index + 1]:.9g} s; "
-            f"expected steps near {step:.6g} s; cut the file at the gap, or make "
-            "both ends recordings of their own (recordings.parts)"
+            f"expected steps near {step:.6g} s; cut the file there into two, or, if "
+            "all files pause there, make recordings of both ends (recordings.parts)"
         )
 
 
@@ -459,9 +492,10 @@ def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColu
 
     What is smooth is interpolated. An input that is not is averaged over each step of the
     grid, because what it moves follows its integral: corners keep their time. Where every
-    point of the grid has a sample next to it, means would only smooth the input and its
-    noise.
+    point of the grid has a sample next to it, and no others are between, means would only
+    smooth the input and its noise.
     """
+    is_faster = float(np.median(np.diff(stamps))) < _FASTER * step
 
     def resampled(column: MeasuredColumn) -> MeasuredColumn:
         known = stamps[: column.values.size]
@@ -470,7 +504,7 @@ def _resample(columns: FileColumns, stamps: np.ndarray, step: float) -> FileColu
         grid = known[0] + step * np.arange(count)
         is_averaged = (
             column is columns.input
-            and not _have_neighbours(grid, known, step)
+            and (is_faster or not _have_neighbours(grid, known, step))
             and not _is_smooth(known, column.values, step)
         )
         put = _averaged if is_averaged else partial(_interpolated, step=step)

@@ -57,7 +57,8 @@ def _time(layout: FolderLayout, proposal: Proposal) -> str:
     called = (
         repr(layout.time.title) if layout.time.title else f"column {layout.time.key}"
     )
-    more = "; jitters, so it is resampled" if layout.resample else ""
+    has_odd_steps = layout.resample and layout.sample_time_s is None
+    more = "; jitters, so it is resampled" if has_odd_steps else ""
     if layout.output_time is not None:
         more = "; the output has a clock of its own: both are put on one"
     step = f"{proposal.sample_time_s:g} s"

@@ -42,7 +42,7 @@ def said(*arguments):
         ("threshold: 0.0001", "threshold: 0.7",
          "crossval.threshold: found 0.7 mm; expected a part of what the output moves by"),
         ("orders:", "  units: {input: A, output: mm}\norders:",
-         "recordings.units.input: found 'A', but the file of two says 'mA'"),
+         "recordings.units.input: found 'A', but the files of one and another say 'mA'"),
     ],
 )  # fmt: skip
 def test_a_slip_in_the_configuration_is_told(folder, old, new, line):

@@ -115,7 +115,8 @@ def test_different_sample_times_are_refused():
     checks.check_sample_time(second, first, 0.02)
     message = (
         r"^b.csv: has a sample time of 0.00101 s; expected 0.001 s as in a.csv, because "
-        "models are discrete; make one experiment for each sample time"
+        r"models are discrete; put all on the slower grid \(recordings: sample_time_s: "
+        r"0.00101, resample: true\), or make one experiment for each sample time"
     )
     with pytest.raises(MeasurementError, match=message):
         checks.check_sample_time(second, first, 0.005)
