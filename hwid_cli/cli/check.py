@@ -33,7 +33,11 @@ from hwid_cli.stages.own_functions import check_own_functions
 from hwid_cli.stages.recording_facts import Checked, check_recordings
 from hwid_cli.stages.run_seconds import page_plan, with_start
 from hwid_cli.stages.selection import named_recordings
-from hwid_cli.stages.simulation_units import overruled_units, refused_units
+from hwid_cli.stages.simulation_units import (
+    calibrated_in_simulation_units,
+    overruled_units,
+    refused_units,
+)
 from hwid_cli.stages.stage import Context, Planning
 from hwid_cli.stages.table import named, needed, none_named, stage_named, to_run
 from hwid_cli.store.cache import Hdf5Store
@@ -123,7 +127,9 @@ def _data(experiment: Experiment, folder: Path) -> tuple[Checked, tuple[str, ...
         survey.recordings, experiment, survey.jitter, survey.missing
     )
     problems += [*survey.problems, *checked.problems]
-    problems += refused_units(experiment, checked.recordings, checked.logs)
+    drive = experiment.drive_simulation
+    converted = calibrated_in_simulation_units(drive, checked.recordings, checked.logs)
+    problems += refused_units(experiment, *converted)
     if checked.facts:
         click.echo(as_text([recordings_table(checked.facts)]))
     known = {one.name for one in survey.recordings} | set(survey.unusable)

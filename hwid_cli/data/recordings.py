@@ -357,9 +357,7 @@ def survey_recordings(experiment: Experiment, out: Path) -> Survey:
     good = {recording.name for recording in common}
     bad = tuple(part.name for part in parts if part.name not in good)
     sample_times_s = {one.name: one.sample_time_s for one in read}
-    return Survey(
-        tuple(common), tuple(problems), bad, jitter, missing, sample_times_s
-    )
+    return Survey(tuple(common), tuple(problems), bad, jitter, missing, sample_times_s)
 
 
 def _jitter(stamps: np.ndarray, *, has_gaps: bool) -> float:

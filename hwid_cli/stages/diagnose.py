@@ -14,6 +14,7 @@ import numpy as np
 
 from hwid_cli.config.extended_simulation import write_extended_simulation
 from hwid_cli.config.simulation_checks import SIMULATION_EXAMPLE
+from hwid_cli.data.units import in_unit
 from hwid_cli.diagnosis import diagnose as pipeline
 from hwid_cli.diagnosis import further_inputs
 from hwid_cli.diagnosis.direction import ReversedInputError, reversal_sentence
@@ -51,6 +52,7 @@ from hwid_cli.stages.foreign_simulation import (
 from hwid_cli.stages.selection import select_recordings
 from hwid_cli.stages.simulation_units import (
     assumed_units,
+    calibrated_in_simulation_units,
     doubtful_sizes,
     in_simulation_units,
     refused_sizes,
@@ -273,13 +275,22 @@ def diagnose(
 
 @dataclass(frozen=True, eq=False)
 class ToDiagnose:
-    """A simulation, and the recordings that it is compared with."""
+    """A simulation, and the recordings that it is compared with.
+
+    Parameters
+    ----------
+    recordings : tuple of Recording
+        In the units of the simulation.
+    units : tuple of str
+        Of input and output in the experiment, where they are others.
+    """
 
     experiment: Experiment
     recordings: tuple[Recording, ...]
     simulation: SimulationOptions | ForeignSimulation
     options: DiagnoseOptions
     logs: tuple[CalibrationLog, ...] = ()
+    units: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:
@@ -346,6 +357,9 @@ def given_by(
         names,
         key=f"{place}.recordings",
     )
+    first = recordings[0]
+    units = (first.input_unit, first.output_unit)
+    recordings, logs = calibrated_in_simulation_units(simulation, recordings, logs)
     if not isinstance(options.hold_out, str):
         held_out = select_recordings(
             recordings, options.hold_out, key=f"{place}.hold_out"
@@ -359,7 +373,7 @@ def given_by(
         raise ConfigError(refused)
     if isinstance(simulation, SimulationOptions):
         recordings = tuple(with_rests(recordings, logs))
-    return ToDiagnose(experiment, recordings, simulation, options, logs)
+    return ToDiagnose(experiment, recordings, simulation, options, logs, units)
 
 
 def _simulation(experiment: Experiment) -> SimulationOptions | ForeignSimulation:
@@ -458,7 +472,7 @@ def undecided(
 
     Parameters
     ----------
-    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+    inputs : sequence of ndarray, shape (n_samples,), [input unit of the experiment]
         At the sample time of the recordings.
 
     Raises
@@ -476,7 +490,7 @@ def answers(
 
     Parameters
     ----------
-    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+    inputs : sequence of ndarray, shape (n_samples,), [input unit of the experiment]
         At the sample time of the recordings.
 
     Raises
@@ -484,7 +498,10 @@ def answers(
     ConfigError
         If the simulation is not the program's own drive.
     """
-    return _on_inputs(given, runner, inputs, further_inputs.answers)
+    found = _on_inputs(given, runner, inputs, further_inputs.answers)
+    unit = given.recordings[0].output_unit
+    own = given.units[1] if given.units else unit
+    return [tuple(in_unit(one, unit, own) for one in each) for each in found]
 
 
 def hidden(
@@ -494,7 +511,7 @@ def hidden(
 
     Parameters
     ----------
-    inputs : sequence of ndarray, shape (n_samples,), [input unit]
+    inputs : sequence of ndarray, shape (n_samples,), [input unit of the experiment]
         At the sample time of the recordings.
 
     Raises
@@ -520,6 +537,9 @@ def _on_inputs(
             "other inputs; choose the goal coverage"
         )
     recordings = given.recordings
+    unit = recordings[0].input_unit
+    own = given.units[0] if given.units else unit
+    inputs = [in_unit(one, own, unit) for one in inputs]
     key = diagnosis_key(given.recordings, simulation, options)
     with runner.rounds("tasks") as (settings, begin_round), one_thread():
         return ask(

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hwid_cli.data.other_units import in_other_units
 from hwid_cli.data.units import factor_between, is_unitless, quantity_of
 from hwid_cli.diagnosis.base_fit import compared_as_given
 from hwid_cli.diagnosis.few_samples import fewer_recordings
@@ -22,6 +23,7 @@ from hwid_cli.records.experiment import (
     RecordingsOptions,
     SimulationOptions,
 )
+from hwid_cli.records.programs import ForeignSimulation
 from hwid_cli.records.recordings import (
     CalibrationLog,
     RawRecording,
@@ -56,6 +58,34 @@ _LADDERS = (
     ("mrad", "rad"),
     ("mrad/s", "rad/s"),
 )
+
+
+def calibrated_in_simulation_units(
+    simulation: SimulationOptions | ForeignSimulation | None,
+    recordings: Sequence[Recording],
+    logs: Sequence[CalibrationLog],
+) -> tuple[tuple[Recording, ...], tuple[CalibrationLog, ...]]:
+    """Recordings in the units of a drive's numbers, where the experiment's are others.
+
+    Models may be wanted in mm, and the same experiment may have a simulation, which
+    counts in m.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Calibrated.
+    logs : sequence of CalibrationLog
+        Theirs; some may be missing.
+    """
+    if not isinstance(simulation, SimulationOptions):
+        return tuple(recordings), tuple(logs)
+    by_name = {one.name: one for one in logs}
+    units = (simulation.input_unit, simulation.output_unit)
+    both = [in_other_units(one, by_name.get(one.name), units) for one in recordings]
+    return (
+        tuple(one for one, _ in both),
+        tuple(log for _, log in both if log is not None),
+    )
 
 
 def refused_units(
@@ -224,26 +254,28 @@ def in_simulation_units(
     ConfigError
         If a unit contradicts the simulation.
     """
-    return tuple(_in_units_of(one, simulation) for one in recordings)
+    units = (simulation.input_unit, simulation.output_unit)
+    for one in recordings:
+        for side in _SIDES:
+            _refuse_other_quantity(one, side, simulation)
+    return tuple(in_other_units(one, None, units)[0] for one in recordings)
 
 
-def _in_units_of(recording: Recording, simulation: SimulationOptions) -> Recording:
-    for side in _SIDES:
-        unit, wanted = (getattr(one, f"{side}_unit") for one in (recording, simulation))
-        accepted = (_USUAL[side], wanted, *_other_units(side, simulation))
-        if unit in accepted or is_unitless(unit):
-            continue
-        factor = factor_between(unit, wanted)
-        if factor is None:
-            raise ConfigError(
-                f"recording {recording.name!r}: {side}_unit: found {unit!r}; expected "
-                f"{wanted!r}, the unit of the simulation, or one that goes into it"
-            )
-        changes = {side: getattr(recording, side) * factor, f"{side}_unit": wanted}
-        if side == "output" and recording.reference is not None:
-            changes["reference"] = recording.reference * factor
-        recording = replace(recording, **changes)
-    return recording
+def _refuse_other_quantity(
+    recording: Recording, side: str, simulation: SimulationOptions
+) -> None:
+    unit, wanted = (getattr(one, f"{side}_unit") for one in (recording, simulation))
+    accepted = (_USUAL[side], *_other_units(side, simulation))
+    if (
+        unit in accepted
+        or is_unitless(unit)
+        or factor_between(unit, wanted) is not None
+    ):
+        return
+    raise ConfigError(
+        f"recording {recording.name!r}: {side}_unit: found {unit!r}; expected "
+        f"{wanted!r}, the unit of the simulation, or one that goes into it"
+    )
 
 
 def refused_sizes(
