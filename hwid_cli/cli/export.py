@@ -30,6 +30,7 @@ from hwid_cli.records.best_model import LINEAR
 from hwid_cli.records.experiment import RecordingsOptions
 from hwid_cli.records.exported import Exported
 from hwid_cli.records.model import Fit
+from hwid_cli.records.recordings import Recording
 from hwid_cli.records.report import StoredResults
 from hwid_cli.report.thesis_names import thesis_name_of
 from hwid_cli.simulations.kinds import KINDS, kind_named
@@ -242,7 +243,7 @@ def _simulation(session: Session) -> Exported:
     exported = export_simulation(
         extended_options(diagnosis, given.simulation),
         given.recordings,
-        _options(session),
+        _in_units_of(given.recordings[0], as_files_are(_read_by(session), given.logs)),
         given.options,
         origin=_origin(session, "diagnose"),
     )
@@ -251,8 +252,18 @@ def _simulation(session: Session) -> Exported:
 
 def _options(session: Session) -> RecordingsOptions:
     """How files are read, with the units that they were found to have."""
-    logs = result_of(session, "calibrate").logs
-    return as_files_are(recordings_options(session.experiment), logs)
+    return as_files_are(_read_by(session), result_of(session, "calibrate").logs)
+
+
+def _read_by(session: Session) -> RecordingsOptions:
+    return recordings_options(session.experiment)
+
+
+def _in_units_of(recording: Recording, options: RecordingsOptions) -> RecordingsOptions:
+    """The same with the units of a recording, where the experiment has others."""
+    return replace(
+        options, input_unit=recording.input_unit, output_unit=recording.output_unit
+    )
 
 
 def _origin(session: Session, stage: str) -> dict[str, object]:
