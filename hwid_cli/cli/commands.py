@@ -50,6 +50,14 @@ def _seldom_collected() -> Iterator[None]:
     metavar="FILE",
     help="Configuration to write.",
 )
+@click.option(
+    "--units",
+    type=click.Choice(("si", "file")),
+    default="si",
+    show_default=True,
+    help="Whether thresholds, limits and results are in SI, or in the units of the files, "
+    "such as mA and mm.",
+)
 @click.option("--force", is_flag=True, help="Replace a configuration that is there.")
 @click.option("-q", "--quiet", is_flag=True, help="Say errors only.")
 def init(*values: Any, **options: Any) -> None:

@@ -1,5 +1,6 @@
 """``hwid init``: a commented starter configuration from a folder of measurements."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -26,11 +27,12 @@ from hwid_cli.stages.proposal import propose
 
 
 def write_starter_configuration(
-    folder: Path, out: Path, force: bool, quiet: bool
+    folder: Path, out: Path, units: str, force: bool, quiet: bool
 ) -> None:
     """Write a commented starter configuration for a folder of measurements."""
     refuse_existing(out, force=force)
     layout = guess_layout(list_measurements(folder))
+    layout = replace(layout, keeps_units=units == "file")
     survey = survey_recordings(draft_experiment(layout, folder), folder)
     slower = with_slower_grid(layout, survey.sample_times_s.values())
     if slower is not layout:

@@ -215,6 +215,8 @@ def _recordings(layout: FolderLayout, own: str) -> dict[str, Any]:
     for side, role in (("input", layout.input), ("output", layout.output)):
         if side not in units:
             section[f"{side}_unit"] = role.unit or _UNKNOWN_UNIT
+        elif _unit_of(role, layout) != _si_unit(role):
+            section[f"{side}_unit"] = _unit_of(role, layout)
     if layout.sample_time_s is not None:
         section["sample_time_s"] = layout.sample_time_s
     if layout.resample:
@@ -336,6 +338,15 @@ def _clock_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     return lines
 
 
+def _unit_of(role: Role, layout: FolderLayout) -> str:
+    """Unit of a signal's numbers in the experiment: SI, or the file's where it is kept.
+
+    Of a force or a torque it is SI: a drive that it pushes has that unit stated, too.
+    """
+    is_push = quantity_of(role.unit) in ("force", "torque")
+    return role.unit if layout.keeps_units and not is_push else _si_unit(role)
+
+
 def _role_lines(name: str, role: Role | None) -> list[str]:
     if role is None:
         return []
@@ -347,12 +358,22 @@ def _unit_lines(layout: FolderLayout) -> list[str]:
     lines, units = [], _units(layout)
     if units:
         stated = {one: getattr(layout, one).unit for one in units}
-        si = {one: QUANTITIES[quantity_of(unit)] for one, unit in stated.items()}
+        ours = {one: QUANTITIES[quantity_of(unit)] for one, unit in stated.items()}
+        ours |= {
+            one: _unit_of(getattr(layout, one), layout) for one in ours if one != "time"
+        }
         lines += [
             f"  units: {_flow(units)}   # as the file says"
             + ("; 'file': each its own" if layout.mixed else ""),
-            f"  # All numbers here are in {', '.join(si.values())} after conversion.",
         ]
+        lines += [
+            f"  {one}_unit: {_flow(unit)}   # of all numbers here and in results; a "
+            "simulation counts in SI"
+            for one, unit in ours.items()
+            if one != "time" and unit != _si_unit(getattr(layout, one))
+        ]
+        after = "." if layout.keeps_units else " after conversion."
+        lines += [f"  # All numbers here are in {', '.join(ours.values())}{after}"]
     for name, role in (("input", layout.input), ("output", layout.output)):
         if name in units:
             continue
@@ -389,7 +410,7 @@ def _fit_lines(proposal: Proposal) -> list[str]:
 
 
 def _validation_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
-    unit = _si_unit(layout.output) or "the output's unit"
+    unit = _unit_of(layout.output, layout) or "the output's unit"
     lines = [
         "# Models of all recordings but those of 'test', judged on all of these.",
         "identify: {recordings: all}",
@@ -422,7 +443,7 @@ def _group_lines(proposal: Proposal) -> list[str]:
 
 def _next_lines(layout: FolderLayout, proposal: Proposal) -> list[str]:
     """Limits of what may be recorded next: what the recordings have reached."""
-    unit = _si_unit(layout.input) or "unit of the input"
+    unit = _unit_of(layout.input, layout) or "unit of the input"
     around = proposal.reached.level
     lines = (
         *(

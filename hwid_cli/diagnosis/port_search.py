@@ -27,10 +27,11 @@ from hwid_cli.drive.catalogue import CATALOGUE, public_id
 from hwid_cli.records.candidates import CandidateFit, ParameterRef
 from hwid_cli.records.diagnosis import STILL_LARGE
 
-# Effects at its ports that the simulation's runs alone call likely: so many are fitted.
+# Effects at its ports that the simulation's runs alone call likely: so many are fitted,
+# and up to so many where others are about as likely.
 # Those that leave more than three times the noise, this share of the gap, and so many
 # times what the stand-in says of another effect wait until that has been tried, [-].
-_MOST_BY_RUNS, _MOST_OF_GAP, _WORTH_WAITING = 2, 0.25, 2.0
+_MOST_BY_RUNS, _MOST_ALIKE, _MOST_OF_GAP, _WORTH_WAITING = 2, 4, 0.25, 2.0
 # So many times what the stand-in says, which the others wait for before they are fitted at
 # all: the parameters, which are fitted with an effect, take the rest of it, [-].
 _FAR_ABOVE = 8.0
@@ -40,7 +41,7 @@ _NEXT_TO_NOISE, _ALIKE = 2.0, 2.0
 # Far from the noise, what another effect at a port, or a richer law of it, leaves of a few
 # recordings at most to be fitted to all of them, over what the first one leaves.
 _CLEARLY_LESS = 0.5
-# Times what the first one of a pair leaves by itself, up to which another may be as well.
+# Times what the first one leaves by itself, up to which another may be as well.
 _AS_LIKELY = 1.2
 
 
@@ -62,7 +63,7 @@ def at_ports_by_runs_alone(
         return
     tried.at_ports = screened_at_ports(tried.findings, runs, values)
     said = _least_said(tried.findings)
-    likely = tried.at_ports.likely[:_MOST_BY_RUNS]
+    likely = _likeliest(tried.at_ports.likely)
     tried.unbegun = [one for one in likely if _is_far_above(tried.findings, one, said)]
     likely = tuple(one for one in likely if one not in tried.unbegun)
     starts = _begun_at_ports(tried, likely, runs)
@@ -89,6 +90,16 @@ def at_ports_by_runs_alone(
             tried.keep(through_runs_at_port(tried, start, runs))
             in_vain = start.left if is_large else in_vain
     tried.keep(_with_wider_law(tried, runs))
+
+
+def _likeliest(likely: Sequence[LikelyAtPort]) -> Sequence[LikelyAtPort]:
+    """The first ones, and those that are about as likely.
+
+    A delay, a lag before a simulation and one behind it leave much the same before the
+    simulation's parameters have followed each of them.
+    """
+    alike = [one for one in likely if one.share <= _AS_LIKELY * likely[0].share]
+    return likely[: max(_MOST_BY_RUNS, min(len(alike), _MOST_ALIKE))]
 
 
 def at_ports_later(tried: TriedEffects, runs: Runs) -> None:
@@ -158,7 +169,7 @@ def _pair_at_ports(tried: TriedEffects, first: PortStart, runs: Runs) -> list[Tu
     known = first.of_effects
     screened = screened_at_ports(findings, runs, first.of_simulation, known)
     found: list[Turn] = []
-    begun = _begun_at_ports(tried, screened.likely[:_MOST_BY_RUNS], runs)
+    begun = _begun_at_ports(tried, _likeliest(screened.likely), runs)
     for start in begun:
         is_clear = start.left <= _NEXT_TO_NOISE
         is_behind = bool(found) and start.left > WITHIN_REACH * begun[0].left

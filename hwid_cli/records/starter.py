@@ -105,6 +105,8 @@ class FolderLayout:
     output_file : tuple of two str or None
         Where the output is in a file of its own: what the name of the input's file has,
         and that of the output's file in its place.
+    keeps_units : bool
+        Whether the experiment's numbers are in the units of the files, and not in SI.
     """
 
     patterns: tuple[str, ...]
@@ -123,6 +125,7 @@ class FolderLayout:
     parts: dict[str, tuple[int, ...]] = field(default_factory=dict)
     output_file: tuple[str, str] | None = None
     mixed: tuple[str, ...] = ()
+    keeps_units: bool = False
 
 
 @dataclass(frozen=True)
