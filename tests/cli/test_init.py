@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 from click.testing import CliRunner
 
 from hwid_cli.cli.main import main
@@ -599,3 +600,50 @@ def test_a_copy_of_a_recording_is_named_and_left_out(folder, tmp_path):
     assert f"{copy.stem}: holds the same numbers as {first.stem}" in result.stdout
     raws = read_recordings(load_experiment(tmp_path / "mine.yaml"), tmp_path)
     assert copy.stem not in {one.name for one in raws}
+
+
+def test_files_of_two_rates_are_put_on_the_slower_clock(tmp_path):
+    measured = tmp_path / "measured"
+    measured.mkdir()
+    rng = np.random.default_rng(4)
+    for number, every in enumerate((1, 2, 1, 2, 2)):
+        current = np.repeat(rng.uniform(-1.0, 1.0, 20), 60)
+        position = scipy.signal.lfilter([0.05], [1.0, -0.95], current)
+        table = np.column_stack([0.005 * np.arange(1200), current, position])[::every]
+        head = "time_s,current_mA,position_mm"
+        path = measured / f"levels_{number}.csv"
+        np.savetxt(path, table, delimiter=",", header=head, comments="")
+    out = tmp_path / "mine.yaml"
+    result = invoke("init", measured, "--out", out)
+
+    assert result.exit_code == 0, result.output
+    assert "2 recordings are sampled every 0.005 s or so, others every 0.01 s" in (
+        result.stdout
+    )
+    raws = read_recordings(load_experiment(out), out)
+    assert {one.sample_time_s for one in raws} == {0.01}
+    assert [one.input.size for one in raws] == [600] * 5
+
+
+def test_numbers_may_stay_in_the_units_of_the_files(tmp_path):
+    measured = tmp_path / "measured"
+    measured.mkdir()
+    for number, size in enumerate((10.0, -20.0, 15.0)):
+        current = np.r_[np.zeros(50), np.full(450, size)]
+        position = scipy.signal.lfilter([0.1], [1.0, -0.95], current)
+        table = np.column_stack([0.01 * np.arange(500), current, position])
+        head = "time_s,current_mA,position_mm"
+        np.savetxt(measured / f"step_{number}.csv", table, "%.6f", ",", header=head, comments="")  # fmt: skip
+    found = {}
+    for units in ("si", "file"):
+        out = tmp_path / f"{units}.yaml"
+        assert invoke("init", measured, "--out", out, "--units", units).exit_code == 0
+        experiment = load_experiment(out)
+        raws = read_recordings(experiment, out)
+        found[units] = (raws[0], experiment.crossval.threshold)
+    (si, in_m), (kept, in_mm) = found["si"], found["file"]
+
+    assert (si.input_unit, si.output_unit) == ("A", "m")
+    assert (kept.input_unit, kept.output_unit) == ("mA", "mm")
+    assert kept.output == pytest.approx(1e3 * si.output)
+    assert in_mm == pytest.approx(1e3 * in_m, rel=0.5)

@@ -270,6 +270,51 @@ def test_resampling_uses_the_stated_sample_time():
     np.testing.assert_allclose(found.input.values, 2.01 * np.arange(7), rtol=1e-14)
 
 
+def test_a_file_that_ticks_faster_is_put_on_the_stated_grid():
+    time = 0.001 * np.arange(400)
+    steps = np.repeat([0.0, 1.0, -1.0, 0.5], 100)
+    fast = FileColumns(
+        array_column("input 'u'", np.where(np.arange(400) % 2, steps, steps + 0.2)),
+        array_column("output 'y'", np.sin(20 * time)),
+        array_column("time 't'", time),
+    )
+
+    found, step = sample_uniformly(
+        PATH, fast, options(sample_time_s=0.005, resample=True)
+    )
+
+    assert step == 0.005
+    assert found.output.values == pytest.approx(np.sin(20 * 0.005 * np.arange(80)))
+    # The mean of what drives the machine in a step, not the sample that comes next to it.
+    middle = found.input.values[np.arange(80) % 20 == 10]
+    assert middle == pytest.approx([0.1, 1.1, -0.9, 0.6], abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("stated", "resample", "words"),
+    [
+        (0.005, False, "or set recordings.resample: true, which puts faster files on"),
+        (
+            0.0005,
+            True,
+            "as recordings.sample_time_s says; correct that key or leave it",
+        ),
+    ],
+)
+def test_another_clock_is_refused_with_what_would_help(stated, resample, words):
+    asked = options(sample_time_s=stated, resample=resample)
+    with pytest.raises(MeasurementError, match=words) as caught:
+        sample_uniformly(PATH, columns(0.001 * np.arange(400)), asked)
+    assert ("faster files" in str(caught.value)) == (not resample)
+
+
+@pytest.mark.parametrize("resample", [False, True])
+def test_a_pause_is_told_as_one_whether_or_not_the_clock_may_jitter(resample):
+    time = 0.02 * np.r_[0:300, 400:700]
+    with pytest.raises(MeasurementError, match="cut the file there into two"):
+        sample_uniformly(PATH, columns(time), options(resample=resample))
+
+
 def test_resampling_does_not_fill_a_gap_longer_than_the_recording():
     time = np.append(np.arange(100.0), [1e5])
     with pytest.raises(MeasurementError, match=r"row 100 .*time jumps by 99901 s"):

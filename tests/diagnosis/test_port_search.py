@@ -272,3 +272,14 @@ def test_a_pair_that_leaves_nothing_has_others_alike_in_its_first_ones_place(
 
     assert done == fitted
     assert begun[4:] == [{ZONE}] * (left_of_other < 40.0)
+
+
+@pytest.mark.parametrize(
+    ("shares", "count"),
+    [((0.10, 0.11, 0.115), 3), ((0.10, 0.3, 0.31), 2), ((0.1,) * 6, 4), ((), 0)],
+)
+def test_effects_that_are_about_as_likely_are_all_fitted(shares, count):
+    # A delay and two lags, before the simulation's parameters have followed them.
+    likely = [LikelyAtPort(one, made_up((), 1.0), {}) for one in shares]
+
+    assert len(port_search._likeliest(likely)) == count

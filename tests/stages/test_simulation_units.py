@@ -14,7 +14,7 @@ from hwid_cli.records.experiment import (
     SimulationOptions,
 )
 from hwid_cli.records.recordings import CalibrationLog, SignalUnit
-from hwid_cli.stages.diagnose import diagnose
+from hwid_cli.stages.diagnose import diagnose, given_by
 from hwid_cli.stages.simulation_units import (
     assumed_units,
     doubtful_sizes,
@@ -273,6 +273,18 @@ def test_parameters_that_are_off_are_no_matter_of_units(factor):
 def test_sizes_are_compared_wherever_recordings_start(start):
     options = DiagnoseOptions(initial_state=start)
     assert "output: mm" in doubt(rescaled(displacement=1e3), options=options)
+
+
+def test_recordings_in_units_of_their_own_are_converted_for_a_drive():
+    kept = [
+        replace(one, output=1e3 * one.output, output_unit="mm") for one in recordings()
+    ]
+    asked = given_by(experiment(output_unit="mm"), kept, ())
+
+    assert asked.units == ("A", "mm")
+    for one, same in zip(asked.recordings, recordings(), strict=True):
+        assert one.output_unit == "m"
+        assert one.output == pytest.approx(same.output)
 
 
 def test_recordings_of_a_program_are_converted():
