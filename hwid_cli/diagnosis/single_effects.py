@@ -87,6 +87,7 @@ def single_in_simulation(
     criteria, base = findings.criteria, findings.base
     are_open = not any(criteria.is_nearly_all(one, base) for one in likely)
     if are_open and tried.ports_are_exact:
+        on_round("effects at the ports of the simulation", 0)
         at_ports_by_runs_alone(tried, runs, values, may_pair=may_pair)
     _try_likely(tried, likely, runs, values, on_round)
     at_ports_later(tried, runs)
