@@ -288,21 +288,25 @@ def orders_sentence(
         pair = (maps.chosen.input_map, maps.chosen.output_map)
         named = " and ".join(one.replace("_", " ") for one in pair)
         said += ", no maps" if set(pair) == {"none"} else f", maps {named}"
-    said += " recommended (hwid order says why)"
-    if maps is not None and maps.evidence.predicts and maps.chosen != maps.given:
-        said += f": put {fit_keys(maps.chosen)} into fit"
+    why = ""
+    if best is not None and best.is_usable and not best.is_linear_better:
+        advised = (orders.overall.nb, orders.overall.nk)
+        why = why_other_orders("the model above", best.place, advised)
+    if why:
+        # One answer: the model that is named, and not what another grid might hold.
+        said += f" on average (hwid order says why); {why}: take the model"
+    else:
+        said += " recommended (hwid order says why)"
+        if maps is not None and maps.evidence.predicts and maps.chosen != maps.given:
+            said += f": put {fit_keys(maps.chosen)} into fit"
     axes = axes_to_widen(orders, orders.overall.nb, orders.overall.nk)
     if delays := orders.further_delays:
         said += (
             f"; models are better with a delay of up to {delays[-1]} samples, which these "
             f"orders do not reach: put {delay_keys(delays)} into fit"
         )
-    elif axes:
+    elif axes and not why:
         said += f"; they lie at the edge of the grid: widen {' and '.join(axes)}"
-    if best is not None and best.is_usable and not best.is_linear_better:
-        advised = (orders.overall.nb, orders.overall.nk)
-        if why := why_other_orders("the model above", best.place, advised):
-            said += f"; {why}"
     return said
 
 

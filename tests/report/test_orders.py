@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hwid_cli.records.best_model import BestModel
 from hwid_cli.records.order import (
     OrderAdvice,
     OrderChoice,
@@ -180,3 +181,15 @@ def test_where_no_model_predicts_the_others_no_orders_are_recommended():
     assert orders_sentence(advice, None).startswith("none recommended: no model of one")
     near = replace(JUDGEMENT, best_rmsd=0.19, output_spread=0.2)
     assert "no choice" not in said(overall=replace(OVERALL, evidence=near))
+
+
+def test_one_answer_is_given_where_the_named_model_has_other_orders():
+    # The advice alone asks for a wider grid; a model that is named needs none.
+    edge = replace(ADVICE, overall=replace(OVERALL, nb=4, nk=5))
+    best = BestModel("a+b/2/3", "test", ("c",), 0.012, "m", 0.01, linear_rmsd=0.03)
+    beside = orders_sentence(edge, None, best)
+
+    assert "widen orders.nb" in orders_sentence(edge, None)
+    assert "the model above has 2/3, which other recordings chose for it" in beside
+    assert beside.endswith("take the model")
+    assert "widen" not in beside
