@@ -27,6 +27,7 @@ from hwid_cli.report.check import check_document, recordings_table, stages_table
 from hwid_cli.report.table import as_text
 from hwid_cli.stages.crossval import loose_threshold
 from hwid_cli.stages.fit_seconds import MEASURED, compiled_loops_place, time_fits
+from hwid_cli.stages.foreign_simulation import content_of, placed
 from hwid_cli.stages.identify import recordings_with_models, stored_fits
 from hwid_cli.stages.joint_seconds import time_joint_fits
 from hwid_cli.stages.own_functions import check_own_functions
@@ -130,12 +131,25 @@ def _data(experiment: Experiment, folder: Path) -> tuple[Checked, tuple[str, ...
     drive = experiment.drive_simulation
     converted = calibrated_in_simulation_units(drive, checked.recordings, checked.logs)
     problems += refused_units(experiment, *converted)
+    problems += _missing_program(experiment)
     if checked.facts:
         click.echo(as_text([recordings_table(checked.facts)]))
     known = {one.name for one in survey.recordings} | set(survey.unusable)
     if known:
         problems += _names(experiment, known)
     return checked, tuple(dict.fromkeys(problems))
+
+
+def _missing_program(experiment: Experiment) -> list[str]:
+    """What keeps a simulation of the user's own from being found."""
+    foreign = experiment.foreign_simulation
+    if foreign is None:
+        return []
+    try:
+        content_of(placed(foreign, experiment.source), experiment.source)
+    except HwidError as error:
+        return [str(error)]
+    return []
 
 
 def _names(experiment: Experiment, known: set[str]) -> list[str]:

@@ -97,6 +97,26 @@ def test_a_program_that_is_not_there(folder):
     )
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("file: plant.py", "file: gone.py", "gone.py', No such file or directory"),
+        (
+            "kind: python\n  file: plant.py",
+            "kind: command\n  command: [./gone, '{inputs}', '{parameters}', '{outputs}']",
+            "simulation.command: found './gone'; expected a program that can be run",
+        ),
+    ],
+)
+def test_check_says_what_is_not_there_before_anything_runs(folder, old, new, words):
+    (folder / "bad.yaml").write_text(NO_COLUMN + PYTHON.replace(old, new))
+    arguments = [str(folder / "bad.yaml"), "--out", str(folder / "out"), "--no-timing"]
+    result = CliRunner().invoke(main, ["check", *arguments])
+
+    assert result.exit_code == 1, result.output
+    assert words in result.stderr
+
+
 def test_a_column_of_outputs_with_gaps(folder):
     path = folder / "raw" / "step_1.csv"
     lines = path.read_text().splitlines()
