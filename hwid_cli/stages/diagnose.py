@@ -44,6 +44,7 @@ from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.foreign_simulation import (
     content_of,
     extended_foreign,
+    in_units_of,
     placed,
     simulated,
     simulator_of,
@@ -360,6 +361,8 @@ def given_by(
     first = recordings[0]
     units = (first.input_unit, first.output_unit)
     recordings, logs = calibrated_in_simulation_units(simulation, recordings, logs)
+    if not isinstance(simulation, SimulationOptions):
+        simulation = in_units_of(simulation, recordings[0])
     if not isinstance(options.hold_out, str):
         held_out = select_recordings(
             recordings, options.hold_out, key=f"{place}.hold_out"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hwid_cli.data.units import quantity_of
+from hwid_cli.data.units import factor_between, quantity_of
 from hwid_cli.diagnosis.run_starts import Begun
 from hwid_cli.diagnosis.simulator import Simulator
 from hwid_cli.diagnosis.stand_in import with_change
@@ -18,6 +18,7 @@ from hwid_cli.errors import ConfigError, ModelFileError, SimulationError
 from hwid_cli.export.json_reader import read_exported
 from hwid_cli.export.loading import check_trust
 from hwid_cli.export.stored_models import read_stored_model
+from hwid_cli.model.normalise import rescaled
 from hwid_cli.records.diagnosis import Diagnosis
 from hwid_cli.records.drive import DriveResponse, told_apart
 from hwid_cli.records.experiment import DiagnoseOptions, SimulationOptions
@@ -25,6 +26,7 @@ from hwid_cli.records.exported import ExportedModel
 from hwid_cli.records.model import HammersteinWiener
 from hwid_cli.records.programs import (
     ForeignSimulation,
+    ModelSimulation,
     RunRequest,
     SimulatorRun,
     StandInChange,
@@ -33,7 +35,8 @@ from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.simulations.extended import run_extended
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.store.final_test_results import read_final_test
-from hwid_cli.store.result_files import has_left_results
+from hwid_cli.store.result_files import has_left_results, results_file
+from hwid_cli.store.results import read_calibrated
 
 
 def placed(options: ForeignSimulation, source: str) -> ForeignSimulation:
@@ -55,7 +58,8 @@ def placed(options: ForeignSimulation, source: str) -> ForeignSimulation:
         if there.results:
             there, model = _of_results(there, source)
         else:
-            model = _of_file(there.file, source)
+            model, units = _of_file(there.file, source)
+            there = replace(there, units=units)
         try:
             there = kind.with_model(there, model)
         except SimulationError as error:
@@ -72,7 +76,36 @@ def _of_results(options: Any, source: str) -> tuple[Any, HammersteinWiener]:
         found = read_stored_model(folder, name)
     except ConfigError as error:
         raise ConfigError(f"{source}: simulation.results: {error}") from error
-    return replace(options, name=name), found.model
+    return replace(options, name=name, units=_units_of(folder)), found.model
+
+
+def _units_of(folder: Path) -> tuple[str, ...]:
+    """Units that the models of a folder of results stand in."""
+    path = folder / results_file("calibrate")
+    if not path.is_file():
+        return ()
+    recordings = read_calibrated(path).recordings
+    return (recordings[0].input_unit, recordings[0].output_unit) if recordings else ()
+
+
+def in_units_of(
+    simulation: ForeignSimulation, recording: Recording
+) -> ForeignSimulation:
+    """A fitted model for recordings in other units than those of its fit.
+
+    Other simulations count in what the configuration says.
+    """
+    if not isinstance(simulation, ModelSimulation) or not simulation.units:
+        return simulation
+    wanted = (recording.input_unit, recording.output_unit)
+    factors = [
+        factor_between(*pair) for pair in zip(simulation.units, wanted, strict=True)
+    ]
+    scales = [1.0 if one is None else one for one in factors]
+    if simulation.model is None or scales == [1.0, 1.0]:
+        return simulation
+    model = rescaled(simulation.model, *scales)
+    return replace(simulation, model=model, units=wanted)
 
 
 def _widest(folder: Path, source: str) -> str:
@@ -89,8 +122,8 @@ def _widest(folder: Path, source: str) -> str:
     return final.models[int(order[0])]
 
 
-def _of_file(file: str, source: str) -> HammersteinWiener:
-    """The model of an exported file."""
+def _of_file(file: str, source: str) -> tuple[HammersteinWiener, tuple[str, ...]]:
+    """The model of an exported file, and the units of its input and its output."""
     try:
         found = read_exported(Path(file))
         step = "name its file under fit.input_map or fit.output_map"
@@ -102,7 +135,8 @@ def _of_file(file: str, source: str) -> HammersteinWiener:
             f"{source}: simulation.file: {file} is a physics simulation; "
             "expected a Hammerstein-Wiener model; write its section with kind: drive"
         )
-    return replace(found.model, sample_time_s=found.sample_time_s)
+    model = replace(found.model, sample_time_s=found.sample_time_s)
+    return model, (found.card.input_unit, found.card.output_unit)
 
 
 _VELOCITIES = {"velocity", "angular velocity"}
