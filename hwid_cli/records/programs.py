@@ -221,8 +221,6 @@ class ModelSimulation(_Parametrised):
         Factors of its linear block (``simulations.model``); a plain number stays.
     model : HammersteinWiener or None
         That the file holds; None until it is read.
-    units : tuple of str
-        Of its input and its output; empty until it is read.
     """
 
     kind: Annotated[str, OneOf(["model"])] = "model"
@@ -232,7 +230,6 @@ class ModelSimulation(_Parametrised):
     parameters: dict[str, float | FreeParameter] = field(default_factory=dict)
     model: HammersteinWiener | None = field(default=None, metadata=NO_KEY)
     model_sample_time_s: float = field(default=0.0, metadata=NO_KEY)
-    units: tuple[str, ...] = field(default=(), metadata=NO_KEY)
     effects: Annotated[dict[str, dict[str, float | str]], Repeatable()] = field(
         default_factory=dict
     )

@@ -157,11 +157,13 @@ class _Names:
 
 
 def _content(options: ModelSimulation) -> str:
-    if options.file:
-        return hash_of_file(options.file)
-    if options.model is None:
+    model = options.model
+    if model is None:
         raise ValueError("the model was not read")
-    text = json.dumps(asdict(options.model), sort_keys=True, default=_plain)
+    if options.file:
+        # Its numbers may stand in other units than the file's.
+        return f"{hash_of_file(options.file)} {model.input_unit} {model.output_unit}"
+    text = json.dumps(asdict(model), sort_keys=True, default=_plain)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

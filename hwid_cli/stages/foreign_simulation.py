@@ -35,8 +35,7 @@ from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.simulations.extended import run_extended
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.store.final_test_results import read_final_test
-from hwid_cli.store.result_files import has_left_results, results_file
-from hwid_cli.store.results import read_calibrated
+from hwid_cli.store.result_files import has_left_results
 
 
 def placed(options: ForeignSimulation, source: str) -> ForeignSimulation:
@@ -58,8 +57,7 @@ def placed(options: ForeignSimulation, source: str) -> ForeignSimulation:
         if there.results:
             there, model = _of_results(there, source)
         else:
-            model, units = _of_file(there.file, source)
-            there = replace(there, units=units)
+            model = _of_file(there.file, source)
         try:
             there = kind.with_model(there, model)
         except SimulationError as error:
@@ -76,16 +74,7 @@ def _of_results(options: Any, source: str) -> tuple[Any, HammersteinWiener]:
         found = read_stored_model(folder, name)
     except ConfigError as error:
         raise ConfigError(f"{source}: simulation.results: {error}") from error
-    return replace(options, name=name, units=_units_of(folder)), found.model
-
-
-def _units_of(folder: Path) -> tuple[str, ...]:
-    """Units that the models of a folder of results stand in."""
-    path = folder / results_file("calibrate")
-    if not path.is_file():
-        return ()
-    recordings = read_calibrated(path).recordings
-    return (recordings[0].input_unit, recordings[0].output_unit) if recordings else ()
+    return replace(options, name=name), found.model
 
 
 def in_units_of(
@@ -95,17 +84,20 @@ def in_units_of(
 
     Other simulations count in what the configuration says.
     """
-    if not isinstance(simulation, ModelSimulation) or not simulation.units:
+    if not isinstance(simulation, ModelSimulation) or simulation.model is None:
         return simulation
+    model = simulation.model
+    own = (model.input_unit, model.output_unit)
     wanted = (recording.input_unit, recording.output_unit)
-    factors = [
-        factor_between(*pair) for pair in zip(simulation.units, wanted, strict=True)
-    ]
-    scales = [1.0 if one is None else one for one in factors]
-    if simulation.model is None or scales == [1.0, 1.0]:
+    factors = [factor_between(*pair) for pair in zip(own, wanted, strict=True)]
+    if own == wanted or None in factors:
         return simulation
-    model = rescaled(simulation.model, *scales)
-    return replace(simulation, model=model, units=wanted)
+    converted = replace(
+        rescaled(model, *(one for one in factors if one is not None)),
+        input_unit=wanted[0],
+        output_unit=wanted[1],
+    )
+    return replace(simulation, model=converted)
 
 
 def _widest(folder: Path, source: str) -> str:
@@ -122,8 +114,8 @@ def _widest(folder: Path, source: str) -> str:
     return final.models[int(order[0])]
 
 
-def _of_file(file: str, source: str) -> tuple[HammersteinWiener, tuple[str, ...]]:
-    """The model of an exported file, and the units of its input and its output."""
+def _of_file(file: str, source: str) -> HammersteinWiener:
+    """The model of an exported file."""
     try:
         found = read_exported(Path(file))
         step = "name its file under fit.input_map or fit.output_map"
@@ -135,8 +127,7 @@ def _of_file(file: str, source: str) -> tuple[HammersteinWiener, tuple[str, ...]
             f"{source}: simulation.file: {file} is a physics simulation; "
             "expected a Hammerstein-Wiener model; write its section with kind: drive"
         )
-    model = replace(found.model, sample_time_s=found.sample_time_s)
-    return model, (found.card.input_unit, found.card.output_unit)
+    return replace(found.model, sample_time_s=found.sample_time_s)
 
 
 _VELOCITIES = {"velocity", "angular velocity"}

@@ -20,7 +20,6 @@ from hwid_cli.records.experiment import (
     AS_FILE,
     DiagnoseOptions,
     Experiment,
-    RecordingsOptions,
     SimulationOptions,
 )
 from hwid_cli.records.programs import ForeignSimulation
@@ -107,13 +106,13 @@ def refused_units(
     tuple of str
         A line for each side at most; empty without a simulation.
     """
-    simulation, options = experiment.drive_simulation, experiment.recordings
-    if simulation is None or options is None:
+    simulation = experiment.drive_simulation
+    if simulation is None or experiment.recordings is None:
         return ()
     found = {}
     for recording in recordings:
         for side in _SIDES:
-            fault = _fault(recording, side, simulation, options)
+            fault = _fault(recording, side, simulation)
             if fault and side not in found:
                 origin = _origin_of(side, recording.name, logs)
                 found[side] = (
@@ -126,11 +125,9 @@ def _fault(
     recording: Recording,
     side: str,
     simulation: SimulationOptions,
-    options: RecordingsOptions,
 ) -> str:
     """What was expected of a side, and what to do; empty where it is right."""
     unit, wanted = (getattr(one, f"{side}_unit") for one in (recording, simulation))
-    label = getattr(options, f"{side}_unit")
     others = _other_units(side, simulation)
     # SI units that the same equations hold in: a force constant may count from volts,
     # and a rotating axis may have the names of a straight one.
@@ -140,11 +137,6 @@ def _fault(
     expected = (
         f"expected {wanted!r}{meant * (side == 'input')}, the unit of the simulation"
     )
-    if label == unit and factor_between(unit, wanted) is not None:
-        return (
-            f"{expected}, or one that is converted: write recordings.units: "
-            f"{{{side}: {unit}}} in place of it"
-        )
     if not quantity_of(unit):
         return (
             f"{expected}; name its unit in recordings.units.{side}, or convert by "

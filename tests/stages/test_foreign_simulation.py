@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from hwid_cli import Recording
+from hwid_cli import Recording, simulate
 from hwid_cli.records.diagnosis import BaseParameter
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import (
     Capabilities,
+    ModelSimulation,
     OutputsSimulation,
     SimulatorRun,
     StandInChange,
@@ -23,11 +24,13 @@ from hwid_cli.simulations.simulation import SimulationKind
 from hwid_cli.stages.foreign_simulation import (
     content_of,
     extended_foreign,
+    in_units_of,
     placed,
     simulated,
     simulator_of,
     uncovered_by,
 )
+from tests.export.model_examples import example_model
 from tests.report.diagnosis_examples import named
 
 STEP_S, N = 1e-3, 200
@@ -114,3 +117,18 @@ def test_a_stand_in_with_an_effect_is_shown_from_where_recordings_start():
     ):
         assert one.start == pytest.approx(zero)
         assert one.rms < 0.01
+
+
+def test_a_fitted_model_follows_the_units_of_the_recordings():
+    model = replace(example_model(3), input_unit="mA", output_unit="mm")
+    of_fit = ModelSimulation(file="m.json", model=model)
+    here = Recording("a", 1e-3 * INPUT, INPUT, STEP_S, input_unit="A", output_unit="m")
+
+    found = in_units_of(of_fit, here).model
+
+    assert (found.input_unit, found.output_unit) == ("A", "m")
+    expected = 1e-3 * simulate(model, 1e3 * here.input)
+    assert simulate(found, here.input) == pytest.approx(expected)
+    # Counts of an encoder go into no other unit.
+    unknown = replace(here, input_unit="mA", output_unit="counts")
+    assert in_units_of(of_fit, unknown) is of_fit
