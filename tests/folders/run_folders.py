@@ -79,9 +79,8 @@ def run(arguments: list[str], folder: Path) -> str:
 
 def names_in(said: str) -> dict[str, str]:
     """The models that the closing block names: the one to take, the linear and the single one."""
-    block = re.sub(
-        r"\s+", " ", said.partition("best model")[2].partition(" orders ")[0]
-    )
+    said = re.sub(r"\s+", " ", said.partition("best model")[2])
+    block = re.split(r" orders (?:nb|none)", said)[0]
     taken, *others = re.findall(_NAME, block)
     linear = [one for one in (taken, *others) if one.startswith("linear:")]
     # Of several recordings it is named by their number, and they are those of the other.
