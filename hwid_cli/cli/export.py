@@ -1,5 +1,6 @@
 """``hwid export``: a model as a file that runs elsewhere."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,7 +31,7 @@ from hwid_cli.records.best_model import LINEAR
 from hwid_cli.records.experiment import RecordingsOptions
 from hwid_cli.records.exported import Exported
 from hwid_cli.records.model import Fit
-from hwid_cli.records.recordings import Recording
+from hwid_cli.records.recordings import CalibrationLog, Recording
 from hwid_cli.records.report import StoredResults
 from hwid_cli.report.thesis_names import thesis_name_of
 from hwid_cli.simulations.kinds import KINDS, kind_named
@@ -97,7 +98,11 @@ def _export_program(session: Session, kind: str, file_format: str) -> list[Path]
         exactness = exactness_of(program, diagnosis)
         return write_module(folder, program.extended, title=title, exactness=exactness)
     origin = _origin(session, "diagnose")
-    card = card_of_program(given.recordings, _options(session), origin=origin)
+    card = card_of_program(
+        given.recordings,
+        _options(session, given.logs),
+        origin=origin,
+    )
     sample_time_s = given.recordings[0].sample_time_s
     if file_format == "fmu":
         path = folder / "simulation.fmu"
@@ -204,7 +209,7 @@ def _exported(
     exported = export_model(
         fit,
         recordings,
-        _options(session),
+        _options(session, result_of(session, "calibrate").logs),
         name=name,
         title=title,
         origin=_origin(session, stage),
@@ -243,20 +248,16 @@ def _simulation(session: Session) -> Exported:
     exported = export_simulation(
         extended_options(diagnosis, given.simulation),
         given.recordings,
-        _in_units_of(given.recordings[0], as_files_are(_read_by(session), given.logs)),
+        _in_units_of(given.recordings[0], _options(session, given.logs)),
         given.options,
         origin=_origin(session, "diagnose"),
     )
     return replace(exported, trust=diagnosis.trust)
 
 
-def _options(session: Session) -> RecordingsOptions:
+def _options(session: Session, logs: Sequence[CalibrationLog]) -> RecordingsOptions:
     """How files are read, with the units that they were found to have."""
-    return as_files_are(_read_by(session), result_of(session, "calibrate").logs)
-
-
-def _read_by(session: Session) -> RecordingsOptions:
-    return recordings_options(session.experiment)
+    return as_files_are(recordings_options(session.experiment), logs)
 
 
 def _in_units_of(recording: Recording, options: RecordingsOptions) -> RecordingsOptions:

@@ -89,13 +89,15 @@ def in_units_of(
     model = simulation.model
     own = (model.input_unit, model.output_unit)
     wanted = (recording.input_unit, recording.output_unit)
-    factors = [factor_between(*pair) for pair in zip(own, wanted, strict=True)]
-    if own == wanted or None in factors:
+    # A side of another quantity, such as counts, stays as it is.
+    factors = [factor_between(*pair) or 1.0 for pair in zip(own, wanted, strict=True)]
+    if factors == [1.0, 1.0]:
         return simulation
+    of_input, of_output = factors
     converted = replace(
-        rescaled(model, *(one for one in factors if one is not None)),
-        input_unit=wanted[0],
-        output_unit=wanted[1],
+        rescaled(model, of_input, of_output),
+        input_unit=own[0] if of_input == 1.0 else wanted[0],
+        output_unit=own[1] if of_output == 1.0 else wanted[1],
     )
     return replace(simulation, model=converted)
 

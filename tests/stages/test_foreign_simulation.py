@@ -132,3 +132,6 @@ def test_a_fitted_model_follows_the_units_of_the_recordings():
     # Counts of an encoder go into no other unit.
     unknown = replace(here, input_unit="mA", output_unit="counts")
     assert in_units_of(of_fit, unknown) is of_fit
+    half = in_units_of(of_fit, replace(here, input_unit="counts")).model
+    assert (half.input_unit, half.output_unit) == ("mA", "m")
+    assert simulate(half, INPUT) == pytest.approx(1e-3 * simulate(model, INPUT))
