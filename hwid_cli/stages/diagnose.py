@@ -73,7 +73,7 @@ from hwid_cli.tasks.runner import RunSettings, Workers, run_tasks
 from hwid_cli.tasks.task import Task, one_thread
 
 NAME = "diagnose"
-STAGE_VERSION = 61
+STAGE_VERSION = 62
 
 _Answer = TypeVar("_Answer")
 

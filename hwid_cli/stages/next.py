@@ -12,7 +12,6 @@ docs/trust.md.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import nan
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +25,6 @@ from hwid_cli.records.model import Fit
 from hwid_cli.records.next import (
     InputMap,
     NextRecordings,
-    PlannedInput,
     ProposedRecording,
 )
 from hwid_cli.records.recordings import Recording
@@ -35,10 +33,11 @@ from hwid_cli.report.next import next_blocks
 from hwid_cli.report.table import Block
 from hwid_cli.stages.diagnose import answers
 from hwid_cli.stages.diagnose import choose as choose_diagnosis
-from hwid_cli.stages.fit_seconds import SECONDS_PER_SIMULATED_SAMPLE, counted
+from hwid_cli.stages.fit_seconds import counted
 from hwid_cli.stages.next_goals import NAME, WAYS, Choice, ToChoose, known_before
+from hwid_cli.stages.next_seconds import choice_seconds
 from hwid_cli.stages.offered_inputs import next_options, odd_inputs, offered_inputs
-from hwid_cli.stages.order_grid import candidate_orders, grid_place
+from hwid_cli.stages.order_grid import grid_place
 from hwid_cli.stages.output_range import (
     Foresee,
     Reach,
@@ -58,10 +57,6 @@ from hwid_cli.store.result_files import Provenance
 from hwid_cli.tasks.task import one_thread
 from hwid_cli.trust.content import content, joined, value_edges
 from hwid_cli.trust.visited import N_BANDS
-
-# Seconds for each sample of a table of what an input visits (measured, 1200 to 50 000
-# samples), and how often one is made of each input.
-_SECONDS_PER_TABLED_SAMPLE, _TABLES_OF_EACH = 4e-7, 4
 
 
 def propose_next(given: ToChoose, runner: Runner) -> NextRecordings:
@@ -251,25 +246,9 @@ def _plan(planning: Planning) -> tuple[StagePlan, ...]:
         f"{counted(len(offered), 'input')} on offer, for {_goal(planning.experiment)}"
     )
     size = sum(8.0 * one.values.size for one in offered)
-    seconds = _seconds(planning, offered)
-    return (StagePlan(NAME, what, len(offered), None, seconds, size),)
-
-
-def _seconds(planning: Planning, offered: Sequence[PlannedInput]) -> float:
-    """How long a choice takes, [s]; NaN where candidates of a diagnosis tell it."""
-    experiment = planning.experiment
-    if _goal(experiment) == "diagnosis":
-        return nan
-    known = sum(one.n_samples for one in planning.recordings)
-    samples = known + sum(one.values.size for one in offered)
-    seconds = _TABLES_OF_EACH * _SECONDS_PER_TABLED_SAMPLE * samples
-    if _goal(experiment) == "parameters":
-        grid = candidate_orders(experiment.orders)
-        linear = max(one.nb + one.nf for _, _, one in grid)
-        # A place and a value of each corner of both maps.
-        n_parameters = linear + 4 * (experiment.fit.units + 1)
-        seconds += SECONDS_PER_SIMULATED_SAMPLE * n_parameters * samples
-    return seconds
+    least, most = choice_seconds(planning, offered, _goal(planning.experiment))
+    why = "the verdict is settled, and effects are looked for that may hide"
+    return (StagePlan(NAME, what, len(offered), None, least, size, most, why),)
 
 
 def _goal(experiment: Experiment) -> str:

@@ -349,6 +349,28 @@ def test_a_range_in_another_unit_is_questioned(bench):
     )
 
 
+@pytest.mark.parametrize(
+    ("allowed", "least", "most"),
+    # Of the whole catalogue, effects that hide are looked for longer.
+    [("[actuator_lag, input_delay]", 0, 3), ("all", 5, 60)],
+)
+def test_check_foresees_how_long_a_diagnosis_lets_a_choice_take(
+    bench, allowed, least, most
+):
+    # What is not compiled yet is not timed.
+    simulate_drive(np.ones(10), DRIVE, sample_time_s=1e-3)
+    config = bench / "bench.yaml"
+    text = DIAGNOSIS.replace("[actuator_lag, input_delay]", allowed)
+    config.write_text(text.replace("duration_s: 0.4", "duration_s: 4"))
+    asked = ["check", str(config), "--out", str(bench / "out")]
+    said = CliRunner().invoke(main, asked)
+    assert said.exit_code == 0, said.output
+    (row,) = re.findall(
+        r"next +\d+ inputs on offer, for diagnosis +- +(.*)", said.output
+    )
+    assert least <= float(re.findall(r"[\d.]+", row)[-1]) <= most, row
+
+
 DIAGNOSIS = """name: bench
 recordings:
   files: raw/*.csv

@@ -1,11 +1,14 @@
 """What a fitted model lacks where the machine has changed, or was never measured."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scipy.signal import lsim
+from scipy.signal import cont2discrete, lsim
 
 from hwid_cli.records.experiment import DiagnoseOptions
 from hwid_cli.records.programs import ModelSimulation, RunRequest
+from hwid_cli.simulations.block_mass import mass_of_block
 from hwid_cli.simulations.kinds import kind_named
 from hwid_cli.simulations.model import free_parameters
 from tests.black_boxes.run_models import (
@@ -66,8 +69,7 @@ def test_factors_of_a_model_are_those_of_its_spring_and_damper(hold):
     found = output_of(model, COMMAND, stiffness=1.3, damping=1.5, gain=0.9)
     command = COMMAND if hold == "foh" else late(COMMAND, 0.5 * STEP_S)
     expected = stage(0.9 * command, 1.5 * 11.0, 1.3 * 2100.0)
-    # What is fed back from sample to sample is half a sample late or more.
-    assert np.std(found - expected) < 0.02 * np.std(expected)
+    assert np.std(found - expected) < 1e-3 * np.std(expected)
     assert np.std(output_of(model, COMMAND) - expected) > 0.3 * np.std(expected)
 
 
@@ -79,6 +81,70 @@ def test_a_model_stays_stable_within_its_limits():
         for damping in free["damping"].bounds:
             found = output_of(model, COMMAND, stiffness=stiffness, damping=damping)
             assert np.max(np.abs(found)) < 20 * np.max(np.abs(stage(COMMAND)))
+
+
+LAG = [0.012, 1.0]
+
+
+def with_lag(damping=11.0, stiffness=2100.0):
+    """A stage whose force, or whose reading, follows within 12 ms."""
+    return ([9.0], np.convolve(LAG, [0.8, damping, stiffness]))
+
+
+def lagging_model(delay):
+    """The same as a fitted model holds it."""
+    above, below, _ = cont2discrete(with_lag(), STEP_S, "zoh" if delay else "foh")
+    block = {"numerator": above.ravel()[delay:], "denominator": below, "delay": delay}
+    return replace(model_of(NO_MAP), **block)
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_a_lag_stays_where_spring_and_damper_have_changed(delay):
+    command = late(COMMAND, 0.5 * STEP_S) if delay else COMMAND
+    expected = 1.1 * lsim(with_lag(2.0 * 11.0, 1.6 * 2100.0), command, TIME)[1]
+    changed = {"gain": 1.1, "damping": 2.0, "stiffness": 1.6}
+    found = output_of(lagging_model(delay), COMMAND, **changed)
+    assert np.std(found - expected) < 2e-3 * np.std(expected)
+
+
+@pytest.mark.parametrize("delay", [0, 1])
+def test_a_force_does_not_wait_for_the_lag_of_the_command(delay):
+    push = np.sin(2 * np.pi * 8 * TIME)
+    found = output_of(lagging_model(delay), 0 * COMMAND, push)
+    expected = stage(late(push, 0.5 * STEP_S) if delay else push)
+    assert np.std(found - expected) < 2e-3 * np.std(expected)
+
+
+@pytest.mark.parametrize(
+    ("poles", "names", "chosen"),
+    [
+        # Two bodies: the slower pair carries the spring.
+        ([-3 + 50j, -3 - 50j, -9 + 300j, -9 - 300j], "stiffness damping", [0, 1]),
+        # A free axis has no spring.
+        ([0.0, -12.0, -400.0], "damping", [0, 1]),
+        # A pair that fits noise beside two tanks.
+        ([-0.5, -3.0, -200 + 300j, -200 - 300j], "stiffness damping", [0, 1]),
+        ([-2.0], "stiffness damping", [0]),
+    ],
+)
+def test_the_mass_of_a_block_is_its_slow_motion(poles, names, chosen):
+    below = np.real(np.poly(np.exp(STEP_S * np.array(poles))))
+    model = replace(model_of(NO_MAP), numerator=np.array([0.0, 1.0]), denominator=below)
+    found = mass_of_block(model)
+    assert found.names == tuple(names.split())
+    np.testing.assert_allclose(
+        np.sort_complex(found.poles),
+        np.sort_complex(np.array(poles)[chosen]),
+        atol=1e-4,
+    )
+
+
+def test_a_lag_without_a_mass_answers_as_a_resistance_and_a_spring():
+    block = cont2discrete(([3.0], [0.5, 4.0]), STEP_S, "foh")
+    model = replace(model_of(NO_MAP), numerator=block[0].ravel(), denominator=block[1])
+    expected = lsim(([3.0], [1.5 * 0.5, 0.7 * 4.0]), COMMAND, TIME)[1]
+    found = output_of(model, COMMAND, damping=1.5, stiffness=0.7)
+    assert np.std(found - expected) < 2e-3 * np.std(expected)
 
 
 @pytest.mark.thorough
