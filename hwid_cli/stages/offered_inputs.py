@@ -161,6 +161,13 @@ def _where_nothing_was(
             f"ones begin and end: put level: {level:.3g} into next.limits of {source} if "
             "the machine works around that"
         ]
+    ends = min(one.min() for one in inputs), max(one.max() for one in inputs)
+    if limits.level != 0.0 and not ends[0] <= limits.level <= ends[1]:
+        return [
+            f"{source}: next.limits.level: found {limits.level:g}{unit}, where no recording "
+            f"was ({in_words(ends, recordings[0].input_unit)}); make sure that the machine "
+            "bears it"
+        ]
     # Towards the side where the recordings were.
     side = _usual_side(recordings, 0.0)
     farthest = max(float((side * one).max()) for one in inputs)

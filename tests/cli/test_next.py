@@ -112,6 +112,11 @@ def test_a_machine_that_works_around_a_level_is_asked_about_it(tmp_path):
     inputs = [played(tmp_path, row)[:, 1] for row in proposals(tmp_path)]
     assert min(one.min() for one in inputs) == 12.0
 
+    # 20 for 12 mA.
+    above = run(tmp_path, limits.replace("amplitude", "level: 20, amplitude"))
+    said = "next.limits.level: found 20 A, where no recording was (12 to 15 A)"
+    assert said in flat(above.stderr)
+
 
 @pytest.mark.thorough
 def test_the_loop_takes_up_what_was_recorded_and_ends(bench):
