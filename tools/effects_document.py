@@ -65,7 +65,7 @@ sample (the current of a lag is what is commanded there, a delay and a rate limi
 bodies, are those of the body that the motor moves (`motor_damping_share` and the like). Where an effect has several equations, what stands in brackets behind one asks for it in `simulation.effects`:
 a word (`curve: tanh`), or one of the parameters that it alone has; with none of them the first is meant.
 
-x counts from the zero of the output, after `calibrate` and less the zero of the sensor where a diagnosis finds one; so do the angles that count along the way (`phase_rad`, `angle_rad`). Angles in time count from the first sample of a recording.
+x counts from the zero of the output, after `calibrate` and less the zero of the sensor where a diagnosis finds one; so do the angles that count along the way (`phase_rad`, `angle_rad`), and the middle of a play, a stop to both sides, a preload and a clearance. Angles in time count from the first sample of a recording.
 S is the longest way of one recording, from its smallest to its largest reading; fn that of mass and spring, and at least 2 / T, which it is on a free axis.
 """
 CHANGE = "parameter_change"
