@@ -11,6 +11,7 @@ from hwid_cli.records.experiment import CrossvalOptions
 from hwid_cli.records.report import StoredResults
 from hwid_cli.report.closing import (
     LINEAR_KEYS,
+    LONG_NAME,
     UNDECIDED_MAPS,
     above_threshold_hint,
     best_model_sentences,
@@ -37,7 +38,7 @@ _WITHOUT_MODEL = ("diagnose", "calibrate", "next")
 # Of a diagnosis; the page has all.
 _MOST_WARNINGS = 2
 # The model to take, as export knows it, in place of a name that is longer than a line.
-BEST, _LONG_NAME = "best", 60
+BEST = "best"
 BEST_LINEAR = f"{LINEAR}{BEST}"
 # What follows a stage, unless its results say more.
 _NEXT = {
@@ -192,7 +193,7 @@ def _after_model(session: Session, best: BestModel) -> str:
             return command_line(session, "order")
         if session.experiment.next is not None and "next" not in results:
             return command_line(session, "next")
-    is_long = len(best.taken_name) > _LONG_NAME
+    is_long = len(best.taken_name) > LONG_NAME
     name = BEST if is_long else best.taken_name
     return command_line(session, "export", "--model", name)
 

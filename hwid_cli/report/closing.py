@@ -19,6 +19,8 @@ from hwid_cli.report.orders import axes_to_widen, delay_keys, no_choice
 # Room for the words on the left, [characters].
 _LABELS = 12
 _FEW = 3
+# A name of more characters fills a line.
+LONG_NAME = 60
 # Share of the RMSD of the maps below which a linear model is better, not as good.
 _CLEARLY = 0.9
 # A band of 90 % that holds less than this on average is too narrow to rely on, [-].
@@ -94,7 +96,7 @@ def best_model_sentences(best: BestModel) -> list[str]:
         return _nothing_to_take(best, on)
     if best.is_linear_better:
         return _linear_sentences(best, mean, on)
-    said = [f"{best.name}: {mean} {_judged(best.rmsd, on, best)}"]
+    said = [f"{_told(best.name)}: {mean} {_judged(best.rmsd, on, best)}"]
     if best.own_maps:
         maps = " and ".join(map_words(*one) for one in best.own_maps)
         said.append(f"its maps, {maps}, come closest to recordings left out in turn")
@@ -135,7 +137,7 @@ def _beside(best: BestModel) -> list[str]:
         if best.linear_rmsd < best.rmsd:
             # Few recordings, and the others speak for the maps.
             said[-1] += (
-                f"; over all recordings but its own {best.name} leaves "
+                f"; over all recordings but its own {_told(best.name)} leaves "
                 f"{best.linear_ratio:.2g} times as much as that"
             )
     if best.singles is not None:
@@ -198,12 +200,23 @@ def _short_name(name: str) -> str:
     return name if count <= _FEW else f"of {count} recordings, orders {orders}"
 
 
+def _told(name: str) -> str:
+    """Name a model in a sentence; of one whose name fills a line, what it is.
+
+    Examples
+    --------
+    >>> _told("step_06/3/7"), _told("linear:" + "+".join(8 * ["2024-03-11_step"]) + "/1/3")
+    ('step_06/3/7', 'the one of 8 recordings, orders 1/3')
+    """
+    return name if len(name) <= LONG_NAME else f"the one {_short_name(name)}"
+
+
 def _nothing_to_take(best: BestModel, on: str) -> list[str]:
     """Say that the mean of the output would be closer than any model."""
     linear = best.linear_fit_percent
     also = f", the linear one {_percent(linear)}" if np.isfinite(linear) else ""
     return [
-        f"no model predicts these recordings: {best.name} has a fit of "
+        f"no model predicts these recordings: {_told(best.name)} has a fit of "
         f"{_percent(best.fit_percent)}{also} on {on}; a constant has 0 %"
     ]
 
@@ -234,9 +247,9 @@ def _linear_sentences(best: BestModel, mean: str, on: str) -> list[str]:
     own = with_unit(best.rmsd, best.unit)
     how = linear_is(best.linear_rmsd, best.rmsd)
     return [
-        f"a linear model is {how}, {best.linear_name}: "
+        f"a linear model is {how}, {_told(best.linear_name)}: "
         f"{mean} {_judged(best.linear_rmsd, on, best)}",
-        f"{best.name}: {own}; these maps are not worth it here",
+        f"{_told(best.name)}: {own}; these maps are not worth it here",
     ]
 
 

@@ -32,11 +32,12 @@ from hwid_cli.records.recordings import (
     RawRecording,
     Recording,
 )
+from hwid_cli.records.units import behind
 from hwid_cli.report.calibration import calibration_table
 from hwid_cli.report.formats import listed
 from hwid_cli.report.sections.calibrate import drawings_of
 from hwid_cli.stages.fit_seconds import counted
-from hwid_cli.stages.proposed_starts import levels_taken_off
+from hwid_cli.stages.proposed_starts import levels_left, levels_taken_off, rest_level
 from hwid_cli.stages.selection import named_recordings, select_recordings
 from hwid_cli.stages.simulation_units import overruled_units
 from hwid_cli.stages.stage import Context, Planning, Runner, Stage, in_results
@@ -307,6 +308,15 @@ def _warnings(context: Context, given: Measured) -> list[str]:
             f"holds the output of {listed([one.name for one in held])}, another one in "
             "each; models do not know that level then: take output_offset out, or add "
             "input_offset"
+        )
+    apart = levels_left(given.recordings, recipes)
+    if apart:
+        kinds = listed(list(dict.fromkeys(one.kind for one in apart)))
+        level = f"{rest_level(apart[0]):.3g}{behind(apart[0].output_unit)}"
+        said.append(
+            f"{source}: calibrate: recordings of the kind {kinds} keep the level at which "
+            f"they rest ({level}), others lose it under the same input: put output_offset "
+            "into the recipes of all kinds, or of none"
         )
     return said
 

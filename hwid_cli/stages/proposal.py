@@ -15,9 +15,11 @@ from hwid_cli.records.experiment import CalibrateOptions
 from hwid_cli.records.recordings import KINDS, CalibrationLog, RawRecording
 from hwid_cli.records.starter import Proposal, Reached
 from hwid_cli.records.units import behind
+from hwid_cli.report.formats import listed
 from hwid_cli.stages.calibrate import calibrate_all
 from hwid_cli.stages.proposed_starts import (
     ALIKE_LEVELS,
+    NO_LEVEL,
     begins_at_rest,
     rest_level,
     rests_anywhere,
@@ -51,6 +53,7 @@ _CUT_RECIPES = {
     **{kind: (*found, ("cut",)) for kind, found in _RECIPES.items()},
     "random": (("cut", "output_offset"), ("cut",)),
 }
+_OWN_LEVELS = "the output rests at other levels under one input: each is subtracted"
 # Words of file names that say what a recording is for.
 _TEST_WORDS = (
     *("test", "val", "valid", "validation", "validate", "pruef", "prüf", "pruefung"),
@@ -284,11 +287,9 @@ def _recipes(
         candidates = _CUT_RECIPES[kind] if needs_cut else _RECIPES[kind]
         fitting = [one for one in candidates if _works(one, kind, own)]
         recipes[kind] = fitting[0] if fitting else ()
-    recipes, level = _with_common_level(raws, kinds, recipes)
-    own_levels = _with_own_levels(raws, kinds, recipes)
-    if own_levels is not None:
-        reason = "the output rests at other levels under one input: each is subtracted"
-        return own_levels, reason
+    recipes, level = _with_levels(raws, kinds, recipes)
+    if level == _OWN_LEVELS:
+        return recipes, level
     some = [
         kind
         for kind, recipe in recipes.items()
@@ -296,7 +297,7 @@ def _recipes(
         and all(begins_at_rest(raw) for raw in raws if kinds[raw.name] == kind)
     ]
     if some:
-        reason = f"tried: {' and '.join(some)} recordings begin with a rest"
+        reason = f"tried: {listed(some)} recordings begin with a rest"
         if recipes.get("random") == ():
             reason += "; random ones are left whole: a cut may begin in mid-motion"
         return recipes, reason + level
@@ -305,21 +306,59 @@ def _recipes(
     return recipes, "no rest is cut: not all recordings begin with one"
 
 
-def _with_own_levels(
+def _with_levels(
+    raws: Sequence[RawRecording],
+    kinds: dict[str, str],
+    recipes: dict[str, tuple[str, ...]],
+) -> tuple[dict[str, tuple[str, ...]], str]:
+    """Recipes that treat the levels at which recordings rest alike in all kinds.
+
+    What is subtracted from steps alone shifts these against all others: the zero of a
+    sensor, a room's temperature, the level that belongs to an input at which a machine
+    is held.
+
+    Returns
+    -------
+    recipes : dict
+    reason : str
+        What stays or goes and why; empty where nothing was to decide.
+    """
+    own = [raw for raw in raws if "output_offset" in recipes[kinds[raw.name]]]
+    without = {
+        kind: tuple(step for step in recipe if step != "output_offset")
+        for kind, recipe in recipes.items()
+    }
+    if own and rests_at_operating_points(own):
+        reason = "; the level at which the output rests goes with the input, and stays"
+        return without, reason
+    of_all = _without_levels(raws, kinds, recipes)
+    # A battery at another charge, an axis at another place: no model of the input knows.
+    if of_all is not None and rests_anywhere(raws):
+        return (of_all, _OWN_LEVELS) if of_all != recipes else (recipes, "")
+    swing = swing_of([raw.output for raw in raws])
+    levels = np.array([rest_level(raw) for raw in own])
+    # A zero that is another one in each recording is subtracted where it is known.
+    if len(own) in (0, len(raws)) or np.ptp(levels) > ALIKE_LEVELS * swing:
+        return recipes, ""
+    size = abs(float(np.mean(levels))) / swing
+    if of_all is not None and size <= ALIKE_LEVELS:
+        return of_all, "; where all others rest is their zero, too"
+    if size <= NO_LEVEL:
+        return recipes, ""
+    level = f"{np.mean(levels):.3g}{behind(raws[0].output_unit)}"
+    return (
+        without,
+        f"; the level at which the output rests, {level}, stays in all of them",
+    )
+
+
+def _without_levels(
     raws: Sequence[RawRecording],
     kinds: dict[str, str],
     recipes: dict[str, tuple[str, ...]],
 ) -> dict[str, tuple[str, ...]] | None:
-    """Recipes that subtract where each recording rests, if the input does not say where.
-
-    A battery at another charge, an axis at another place: no model of the input knows.
-
-    Returns
-    -------
-    dict or None
-        None where all rest where their inputs say, or recipes do it already.
-    """
-    if not all(map(begins_at_rest, raws)) or not rests_anywhere(raws):
+    """Recipes that subtract the level of every recording; None where one shows none."""
+    if not all(map(begins_at_rest, raws)):
         return None
     found = {
         kind: recipe if "output_offset" in recipe else (*recipe, "output_offset")
@@ -329,45 +368,7 @@ def _with_own_levels(
         _works(recipe, kind, [raw for raw in raws if kinds[raw.name] == kind])
         for kind, recipe in found.items()
     )
-    return found if works and found != recipes else None
-
-
-def _with_common_level(
-    raws: Sequence[RawRecording],
-    kinds: dict[str, str],
-    recipes: dict[str, tuple[str, ...]],
-) -> tuple[dict[str, tuple[str, ...]], str]:
-    """Recipes that leave a level at which all rest, where some kinds would keep it.
-
-    A room's temperature, say: subtracted from steps alone, it shifts these against
-    all others. So does the level that belongs to an input at which a machine is held.
-    A zero that is another one in each recording is subtracted.
-
-    Returns
-    -------
-    recipes : dict
-    reason : str
-        What stays and why; empty where nothing was to decide.
-    """
-    own = [raw for raw in raws if "output_offset" in recipes[kinds[raw.name]]]
-    if not own:
-        return recipes, ""
-    kept = {
-        kind: tuple(step for step in recipe if step != "output_offset")
-        for kind, recipe in recipes.items()
-    }
-    if rests_at_operating_points(own):
-        reason = "; the level at which the output rests goes with the input, and stays"
-        return kept, reason
-    if len(own) == len(raws):
-        return recipes, ""
-    swing = swing_of([raw.output for raw in raws])
-    levels = np.array([rest_level(raw) for raw in own])
-    is_common = np.ptp(levels) <= ALIKE_LEVELS * swing
-    if not is_common or abs(np.mean(levels)) <= ALIKE_LEVELS * swing:
-        return recipes, ""
-    level = f"{np.mean(levels):.3g}{behind(raws[0].output_unit)}"
-    return kept, f"; the level at which the output rests, {level}, stays in all of them"
+    return found if works else None
 
 
 def _works(recipe: tuple[str, ...], kind: str, raws: Sequence[RawRecording]) -> bool:

@@ -13,7 +13,7 @@ ALIKE_LEVELS = 0.05
 # the second stays, [-].
 _STILL = 0.01
 # So much of the swing is no level, [-].
-_NO_LEVEL = 0.01
+NO_LEVEL = 0.01
 _RESTS = (
     "all recordings begin with a rest, so 'steady': nothing is fitted to their starts"
 )
@@ -82,6 +82,36 @@ def levels_taken_off(
         )
     )
     return own if several else []
+
+
+def levels_left(
+    raws: Sequence[RawRecording], recipes: Mapping[str, tuple[str, ...]]
+) -> list[RawRecording]:
+    """Recordings that keep the level at which others rest as well, and lose it.
+
+    Their recipe does not subtract it and that of another kind does, under the same input:
+    two places of one machine, which no model can hold.
+
+    Parameters
+    ----------
+    recipes : mapping of str to tuple of str
+        Steps of calibration of each kind.
+    """
+    resting = [raw for raw in raws if begins_at_rest(raw)]
+    lost = [raw for raw in resting if "output_offset" in recipes[raw.kind]]
+    kept = [raw for raw in resting if "output_offset" not in recipes[raw.kind]]
+    lost = [raw for raw in lost if "input_offset" not in recipes[raw.kind]]
+    if not lost:
+        return []
+    inputs = np.array([_rest_levels(raw)[0] for raw in lost])
+    alike = ALIKE_LEVELS * swing_of([raw.input for raw in raws])
+    level = ALIKE_LEVELS * swing_of([raw.output for raw in raws])
+    return [
+        raw
+        for raw in kept
+        if np.min(np.abs(inputs - _rest_levels(raw)[0])) <= alike
+        and abs(rest_level(raw)) > level
+    ]
 
 
 def rests_anywhere(raws: Sequence[RawRecording]) -> bool:
@@ -168,7 +198,7 @@ def _rest_at_zero(
         swing_of([raw.output for raw in raws]),
     )
     return all(
-        bool(np.max(np.abs(levels)) <= _NO_LEVEL * swing)
+        bool(np.max(np.abs(levels)) <= NO_LEVEL * swing)
         for levels, swing in zip((inputs, outputs), swings, strict=True)
     )
 
@@ -191,13 +221,22 @@ def _rest_where_the_input_says(
     recipes: Mapping[str, tuple[str, ...]],
     kinds: Mapping[str, str],
 ) -> bool:
-    """Whether equal levels of the input go with equal levels of the output."""
+    """Whether equal levels of the input go with equal levels of the output.
+
+    Where an input holds the output, its level is another one every day, so that its
+    scatter counts. At an input of zero one recording that rests elsewhere is enough.
+    """
     inputs, outputs = _levels(raws, recipes, kinds).T
     alike = ALIKE_LEVELS * swing_of([raw.input for raw in raws])
-    same = np.abs(inputs[:, None] - inputs) <= alike
-    apart = np.abs(outputs[:, None] - outputs)
     limit = ALIKE_LEVELS * swing_of([raw.output for raw in raws])
-    return not bool((same & (apart > limit)).any())
+    same = np.abs(inputs[:, None] - inputs) <= alike
+    off = outputs - same @ outputs / same.sum(axis=1)
+    is_held = (np.abs(inputs) > alike) & (same.sum(axis=1) > 1)
+    scatter = float(np.sqrt(np.mean(off[is_held] ** 2))) if is_held.any() else 0.0
+    free = ~is_held
+    apart = np.abs(outputs[free, None] - outputs[free])
+    is_elsewhere = (same[np.ix_(free, free)] & (apart > limit)).any()
+    return scatter <= limit and not bool(is_elsewhere)
 
 
 def _stays_away(raw: RawRecording) -> bool:

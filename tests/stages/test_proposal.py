@@ -235,6 +235,39 @@ def test_levels_that_go_with_the_input_stay_beside_recordings_that_begin_in_moti
     assert "goes with the input, and stays" in found.recipe_reason
 
 
+def test_a_level_that_is_another_one_every_day_still_goes_with_the_input():
+    # An oven at 50 % is warmer on one day than on another; at 45 % it is colder.
+    runs = [
+        at_a_level("step_up", 50.0, 70.0),
+        at_a_level("step_down", 50.0, 30.0),
+        at_a_level("step_large", 40.0, 75.0),
+        at_a_level("noise_1", 50.0, 65.0),
+    ]
+    shifted = [
+        replace(one, output=one.output + shift)
+        for one, shift in zip(runs, (1.0, -1.0, 0.4, -0.9), strict=True)
+    ]
+    found = propose(shifted)
+    assert not any("output_offset" in recipe for recipe in found.recipes.values())
+    assert found.fit_start == (
+        "steady",
+        "all recordings begin with a rest, so 'steady': nothing is fitted to their starts",
+    )
+
+
+def test_the_zero_of_a_sensor_goes_from_recordings_of_all_kinds():
+    step = after_a_rest(np.ones(600))
+    sine = after_a_rest(np.sin(np.arange(600) / 20))
+    several = [raw("step_1", step), raw("step_2", -step), raw("sine_1", sine)]
+    zero = 0.03 * np.ptp(several[0].output)
+    found = propose([replace(one, output=one.output + zero) for one in several])
+    assert {kind for kind, one in found.recipes.items() if "output_offset" in one} == {
+        "step",
+        "sine",
+    }
+    assert found.fit_start[0] == "zero"
+
+
 def battery(name, charge, seed):
     """Pulses of a current after a rest, and a cell's voltage, which depends on its charge."""
     rng = np.random.default_rng(seed)

@@ -1,12 +1,14 @@
 """How models take recordings to start, as ``init`` proposes it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from hwid_cli.records.recordings import RawRecording
 from hwid_cli.stages.proposal import propose
-from hwid_cli.stages.proposed_starts import levels_taken_off
+from hwid_cli.stages.proposed_starts import levels_left, levels_taken_off
 
 REST, N = 100, 900
 
@@ -140,3 +142,21 @@ def test_a_recipe_that_takes_off_where_an_input_holds_the_output(
     ]
     recipes = {one.kind: recipe for one in raws}
     assert levels_taken_off(raws, recipes) == (raws if is_taken_off else [])
+
+
+@pytest.mark.parametrize(
+    ("recipe", "other", "offset", "is_left"),
+    [
+        (("cut", "output_offset"), (), 20.0, True),
+        # Both lose it, or none; a zero of no size; the input loses its level as well.
+        (("cut", "output_offset"), ("output_offset",), 20.0, False),
+        (("cut",), (), 20.0, False),
+        (("cut", "output_offset"), (), 0.0, False),
+        (("cut", "input_offset", "output_offset"), (), 20.0, False),
+    ],
+)
+def test_a_level_that_one_kind_loses_and_another_keeps(recipe, other, offset, is_left):
+    a, b = (settled(name, 1.0, offset=offset) for name in ("step_1", "random_1"))
+    raws = [replace(a, kind="step"), replace(b, kind="random")]
+    found = levels_left(raws, {"step": recipe, "random": other})
+    assert [one.name for one in found] == (["random_1"] if is_left else [])
