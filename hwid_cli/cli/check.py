@@ -168,7 +168,7 @@ def _show_warnings(experiment: Experiment, checked: Checked, out: Path) -> None:
     context = Context(experiment, out, {"calibrate": calibrated})
     # What a simulation is compared with needs no section 'diagnose' to be looked at.
     extra = () if experiment.simulation is None else ("diagnose",)
-    said: list[str] = []
+    said = list(checked.warnings)
     for name in dict.fromkeys((*named(experiment), *extra)):
         stage = stage_named(name)
         # Their results are all that is there.

@@ -298,10 +298,24 @@ def _warnings(context: Context, given: Measured) -> list[str]:
         for doubt in several
     ]
     said += overruled_units(source, given.recordings)
-    if given.options is None:
-        return said
-    recipes = {one.kind: getattr(given.options, one.kind) for one in given.recordings}
-    held = levels_taken_off(given.recordings, recipes)
+    return said + level_warnings(source, given.recordings, given.options)
+
+
+def level_warnings(
+    source: str, raws: Sequence[RawRecording], options: CalibrateOptions | None
+) -> list[str]:
+    """Levels that recipes take off, after which no model knows where the machine stands.
+
+    Parameters
+    ----------
+    source : str
+        Of the configuration.
+    """
+    if options is None:
+        return []
+    said = []
+    recipes = {one.kind: getattr(options, one.kind) for one in raws}
+    held = levels_taken_off(raws, recipes)
     if held:
         said.append(
             f"{source}: calibrate: output_offset takes off the level at which the input "
@@ -309,7 +323,7 @@ def _warnings(context: Context, given: Measured) -> list[str]:
             "each; models do not know that level then: take output_offset out, or add "
             "input_offset"
         )
-    apart = levels_left(given.recordings, recipes)
+    apart = levels_left(raws, recipes)
     if apart:
         kinds = listed(list(dict.fromkeys(one.kind for one in apart)))
         level = f"{rest_level(apart[0]):.3g}{behind(apart[0].output_unit)}"

@@ -9,7 +9,7 @@ from hwid_cli.errors import HwidError
 from hwid_cli.records.check import RecordingFacts
 from hwid_cli.records.experiment import Experiment
 from hwid_cli.records.recordings import CalibrationLog, RawRecording, Recording
-from hwid_cli.stages.calibrate import calibrate_all
+from hwid_cli.stages.calibrate import calibrate_all, level_warnings
 
 # Clocks that deviate by a larger share of the sample time are worth a note, [-].
 _NOTED_JITTER = 1e-3
@@ -25,12 +25,15 @@ class Checked:
         Those that can be calibrated.
     logs : tuple of CalibrationLog
         Theirs.
+    warnings : tuple of str
+        What is odd about their recipes.
     """
 
     facts: tuple[RecordingFacts, ...]
     recordings: tuple[Recording, ...]
     problems: tuple[str, ...]
     logs: tuple[CalibrationLog, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def check_recordings(
@@ -78,7 +81,10 @@ def check_recordings(
                 notes=notes,
             )
         )
-    return Checked(tuple(facts), tuple(recordings), tuple(problems), tuple(logs))
+    warnings = level_warnings(str(experiment.source), raws, experiment.calibrate)
+    return Checked(
+        tuple(facts), tuple(recordings), tuple(problems), tuple(logs), tuple(warnings)
+    )
 
 
 def _two_digits(number: float) -> str:

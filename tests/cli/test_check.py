@@ -2,8 +2,10 @@ import json
 import re
 
 import h5py
+import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.signal import lfilter
 
 from hwid_cli.cli.main import main
 
@@ -210,6 +212,30 @@ def test_missing_measurements_are_one_problem(tmp_path):
     assert result.exit_code == 1
     assert result.stderr.count("\n") == 1
     assert "no file matches" in result.stderr
+
+
+def test_a_level_that_steps_alone_would_lose_is_told(tmp_path):
+    rest, rng = np.full(100, 50.0), np.random.default_rng(3)
+    inputs = {
+        "step_1": np.r_[rest, np.full(400, 60.0)],
+        "random_1": np.r_[rest, 50.0 + np.repeat(rng.normal(0, 9, 40), 10)],
+    }
+    for name, u in inputs.items():
+        oven = 98.0 + lfilter([0.02], [1, -0.98], 1.4 * (u - 50.0))
+        np.savetxt(
+            tmp_path / f"{name}.csv", np.c_[u, oven], delimiter=",", header="u,y"
+        )
+    text = (
+        "name: oven\nrecordings: {files: '*.csv', columns: {input: u, output: y}, "
+        "sample_time_s: 1, kind: {step: 'step*', random: 'random*'}}\n"
+        "calibrate: {step: [cut, output_offset], random: []}\n"
+    )
+    (tmp_path / "oven.yaml").write_text(text)
+    said = check(tmp_path / "oven.yaml").stderr
+    expected = "the kind random keep the level at which they rest (98 m), others lose it"
+    assert expected in said
+    (tmp_path / "oven.yaml").write_text(text.replace(", output_offset", ""))
+    assert "keep the level" not in check(tmp_path / "oven.yaml").stderr
 
 
 def test_an_experiment_that_only_simulates_is_sound(tmp_path):
