@@ -245,7 +245,7 @@ class Answer:
 def answered(findings: Findings, turn: Turn, runs: Runs) -> Answer | None:
     """Run the simulation with the effect's force, and correct the stand-in.
 
-    None where a force is not finite, or a run gives no answer.
+    None where a force or the stand-in's motion is not finite, or a run gives no answer.
     """
     problem = turn.problem
     motions = simulate_at(problem, *rebuilt(problem, turn.fit, findings.scales))
@@ -257,6 +257,8 @@ def answered(findings: Findings, turn: Turn, runs: Runs) -> Answer | None:
     if found is None:
         return None
     late = _late(problem, motions, found)
+    if not all(np.isfinite(one).all() for one in late):
+        return None
     problem = _with_starts(problem, found)
     corrected = _corrected(problem, late, [run.output for run in found], forces)
     fit = where_it_starts(corrected, turn.fit)

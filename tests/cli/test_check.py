@@ -232,7 +232,9 @@ def test_a_level_that_steps_alone_would_lose_is_told(tmp_path):
     )
     (tmp_path / "oven.yaml").write_text(text)
     said = check(tmp_path / "oven.yaml").stderr
-    expected = "the kind random keep the level at which they rest (98 m), others lose it"
+    expected = (
+        "the kind random keep the level at which they rest (98 m), others lose it"
+    )
     assert expected in said
     (tmp_path / "oven.yaml").write_text(text.replace(", output_offset", ""))
     assert "keep the level" not in check(tmp_path / "oven.yaml").stderr

@@ -128,3 +128,24 @@ def test_derivatives_by_a_parameter_are_seen_beside_the_rounding_of_a_run():
     (seen,) = turns._slope(push, {"a": 1.0}, parameter, found, 0.5)
     assert np.corrcoef(seen, way)[0, 1] > 0.99
     assert np.corrcoef(rough, way)[0, 1] < 0.95
+
+
+def test_a_stand_in_that_runs_away_ends_the_turns(monkeypatch):
+    """A gain without dynamics is no drive: what stands for it may explode."""
+    of = problem(recordings({}))
+    signals = of.signals
+    calm = [np.zeros(one.input.size) for one in signals]
+    wild = [np.full(one.input.size, np.inf) for one in signals]
+    read = [SimulatorRun(one, np.zeros(0)) for one in calm]
+    monkeypatch.setattr(turns, "rebuilt", lambda *_: (None, None))
+    monkeypatch.setattr(turns, "forces_along", lambda *_: calm)
+    monkeypatch.setattr(turns, "as_sent", lambda *_, **__: calm)
+    monkeypatch.setattr(turns, "pushed", lambda *_: read)
+    monkeypatch.setattr(
+        turns,
+        "simulate_at",
+        lambda *_: [SimpleNamespace(output=one, position=one) for one in wild],
+    )
+    first = Turn(of, FIT, {}, 100.0, at_force=True)
+    findings = SimpleNamespace(scales=None)
+    assert turns.answered(findings, first, runs=None) is None
