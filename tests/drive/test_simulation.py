@@ -354,7 +354,7 @@ def with_one_at_its_largest(effect):
         largest = one.bounds(SCALES)[1]
         if np.isinf(largest):
             # Far beyond what a search begins with, as a search may get there.
-            largest = 1e3 * max(map(abs, one.starts(SCALES)))
+            largest = 1e6 * max(map(abs, one.starts(SCALES)))
         # Those of a change of the drive itself are not among the cases.
         values = EVERY.get(effect.id, {})
         yield {**values, one.name: largest}
