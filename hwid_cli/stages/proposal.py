@@ -344,7 +344,8 @@ def _with_levels(
     if of_all is not None and size <= ALIKE_LEVELS:
         # A sine would lose the mean over a period, which of a bent map is no zero.
         if "sine" in of_all:
-            return without, "; the zero of the sensor stays in all of them"
+            stays = "; the zero of the sensor stays in all of them"
+            return without, stays if size > NO_LEVEL else ""
         return of_all, "; where all others rest is their zero, too"
     if size <= NO_LEVEL:
         return recipes, ""

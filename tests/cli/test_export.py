@@ -74,7 +74,7 @@ def test_the_linear_model_beside_the_best_has_a_name_too(
 def test_a_name_that_is_longer_than_a_line_is_not_asked_for(
     monkeypatch, after_run, hwid
 ):
-    monkeypatch.setattr(closing, "_LONG_NAME", 5)
+    monkeypatch.setattr(closing, "LONG_NAME", 5)
     assert hwid("run").stdout.rstrip().endswith("--model best")
 
 
