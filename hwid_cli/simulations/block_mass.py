@@ -7,7 +7,7 @@ damper and a spring without a mass:
     (s - s1) (s - s2) = s^2 + c s + k          s - s1 = s + k, of which c is 1
 
 Changed by factors they have other roots, and other poles of the block; the poles left
-are a lag that hardly changes. A mass answers fast pushes alike whatever its spring, so
+are a lag that stays. A mass answers fast pushes alike whatever its spring, so
 the gain follows by
 
     B' = B prod phi(s_i') / prod phi(s_i),     phi(s) = (exp(s T) - 1) / s,
@@ -26,8 +26,8 @@ STIFFNESS, DAMPING = "stiffness", "damping"
 # A pair that swings is the mass, unless a pole is so many times slower: then the pair is
 # a further one, or fits noise, [-].
 _SLOWEST_SHARE = 10.0
-# A pole so near 1 integrates: there is no spring, 1 - |z|.
-_INTEGRATES = 1e-9
+# A pole so near 1 integrates: there is no spring. Rounding parts two of them by 1e-8, [-].
+_INTEGRATES = 1e-7
 # Numerators of a mass, of one pole and of two, with gain 1: of a force that is joined by
 # lines, and of one that is held and shows a sample later. The two poles are those of slow
 # motion, whose samples are a spline's.

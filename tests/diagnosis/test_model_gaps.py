@@ -122,6 +122,8 @@ def test_a_force_does_not_wait_for_the_lag_of_the_command(delay):
         ([-3 + 50j, -3 - 50j, -9 + 300j, -9 - 300j], "stiffness damping", [0, 1]),
         # A free axis has no spring.
         ([0.0, -12.0, -400.0], "damping", [0, 1]),
+        # A mass alone, whose two poles at 1 rounding parts.
+        ([0.0, 0.0], "", [0, 1]),
         # A pair that fits noise beside two tanks.
         ([-0.5, -3.0, -200 + 300j, -200 - 300j], "stiffness damping", [0, 1]),
         ([-2.0], "stiffness damping", [0]),
