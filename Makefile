@@ -61,7 +61,7 @@ run: $(RUN)  ## the main job on the virtual gun: raw measurements in, tables out
 test: $(DEV)  ## fast tests, below 90 s on two cores
 	$(BIN)/python -m pytest --quiet --numprocesses auto --dist worksteal
 
-test-thorough: $(DEV)  ## tests that take a fifth of a second or more, for CI: eight minutes on two cores
+test-thorough: $(DEV)  ## tests that take a fifth of a second or more: eight minutes on two cores
 	$(BIN)/python -m pytest --quiet --numprocesses auto --dist worksteal -m 'thorough and not slow and not browser'
 
 test-all: $(DEV)  ## all tests, also the slow ones
