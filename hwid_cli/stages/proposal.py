@@ -53,7 +53,6 @@ _CUT_RECIPES = {
     **{kind: (*found, ("cut",)) for kind, found in _RECIPES.items()},
     "random": (("cut", "output_offset"), ("cut",)),
 }
-_OWN_LEVELS = "the output rests at other levels under one input: each is subtracted"
 # Words of file names that say what a recording is for.
 _TEST_WORDS = (
     *("test", "val", "valid", "validation", "validate", "pruef", "prüf", "pruefung"),
@@ -288,8 +287,6 @@ def _recipes(
         fitting = [one for one in candidates if _works(one, kind, own)]
         recipes[kind] = fitting[0] if fitting else ()
     recipes, level = _with_levels(raws, kinds, recipes)
-    if level == _OWN_LEVELS:
-        return recipes, level
     some = [
         kind
         for kind, recipe in recipes.items()
@@ -331,17 +328,22 @@ def _with_levels(
     if own and rests_at_operating_points(own):
         reason = "; the level at which the output rests goes with the input, and stays"
         return without, reason
-    of_all = _without_levels(raws, kinds, recipes)
+    all_rest = all(map(begins_at_rest, raws))
     # A battery at another charge, an axis at another place: no model of the input knows.
-    if of_all is not None and rests_anywhere(raws):
-        return (of_all, _OWN_LEVELS) if of_all != recipes else (recipes, "")
+    if all_rest and rests_anywhere(raws):
+        of_all = _without_levels(raws, kinds, recipes)
+        if of_all is not None and of_all != recipes:
+            reason = "; at other levels under one input, each of which is subtracted"
+            return of_all, reason
     swing = swing_of([raw.output for raw in raws])
     levels = np.array([rest_level(raw) for raw in own])
     # A zero that is another one in each recording is subtracted where it is known.
     if len(own) in (0, len(raws)) or np.ptp(levels) > ALIKE_LEVELS * swing:
         return recipes, ""
     size = abs(float(np.mean(levels))) / swing
-    if of_all is not None and size <= ALIKE_LEVELS:
+    is_zero = all_rest and size <= ALIKE_LEVELS
+    of_all = _without_levels(raws, kinds, recipes) if is_zero else None
+    if of_all is not None:
         # A sine would lose the mean over a period, which of a bent map is no zero.
         if "sine" in of_all:
             stays = "; the zero of the sensor stays in all of them"
@@ -361,9 +363,7 @@ def _without_levels(
     kinds: dict[str, str],
     recipes: dict[str, tuple[str, ...]],
 ) -> dict[str, tuple[str, ...]] | None:
-    """Recipes that subtract the level of every recording; None where one shows none."""
-    if not all(map(begins_at_rest, raws)):
-        return None
+    """Recipes that subtract the level of recordings that all rest; None if one cannot."""
     found = {
         kind: recipe if "output_offset" in recipe else (*recipe, "output_offset")
         for kind, recipe in recipes.items()
